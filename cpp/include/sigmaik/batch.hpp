@@ -1,0 +1,30 @@
+#pragma once
+/// \file batch.hpp
+/// Many independent problems at once.
+
+#include <cstddef>
+#include <cstdint>
+
+#include <sigmaik/inverse.hpp>
+
+namespace sigmaik {
+
+/// Shape and options of solve_batch().
+struct BatchShape {
+  std::size_t count = 0;  ///< B
+  int rows = 0;           ///< m, 1 … 6
+  int cols = 0;           ///< n, 1 … 16
+};
+
+/// Solves `count` problems, each as a fresh VelocitySolver would: the answers depend neither on their order nor on
+/// `threads`. No heap apart from starting the threads.
+/// \param jacobian (B, m, n) in C order
+/// \param twist (B, m)
+/// \param qdot out: (B, n); zero where the problem is not finite
+/// \param status out: (B,); may be null
+/// \param threads ≥ 1
+/// \throws Error where a shape or parameter is out of its range
+void solve_batch(const Method& method, double length_scale, const BatchShape& shape, const double* jacobian,
+                 const double* twist, double* qdot, std::int8_t* status = nullptr, int threads = 1);
+
+}  // namespace sigmaik

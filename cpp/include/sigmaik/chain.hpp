@@ -1,0 +1,110 @@
+#pragma once
+/// \file chain.hpp
+/// The arm: a serial chain of segments, immutable once made.
+
+#include <array>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <sigmaik/types.hpp>
+
+namespace sigmaik {
+
+enum class JointType { Fixed, Revolute, Continuous, Prismatic };
+
+/// "fixed", "revolute", "continuous", "prismatic".
+const char* to_string(JointType type) noexcept;
+
+/// Mass distribution of a link. The tensor is about the centre of mass, in the link's axes.
+struct Inertia {
+  double mass = 0.0;                                       ///< [kg]
+  Eigen::Vector3d center_of_mass = Eigen::Vector3d::Zero();  ///< [m], in the link frame
+  Eigen::Matrix3d tensor = Eigen::Matrix3d::Zero();        ///< [kg·m²]
+};
+
+/// A joint and the link that it carries. The link frame is the joint frame after the motion:
+/// parent ← origin · motion(axis, q).
+struct Segment {
+  std::string joint_name;
+  std::string link_name;
+  JointType type = JointType::Fixed;
+  Pose origin = Pose::Identity();                      ///< joint frame in the parent link, at q = 0
+  Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();     ///< in the joint frame; normalised by Chain
+  double lower = -std::numeric_limits<double>::infinity();         ///< [rad or m]
+  double upper = std::numeric_limits<double>::infinity();          ///< [rad or m]
+  double velocity = std::numeric_limits<double>::infinity();       ///< [rad/s or m/s], > 0
+  double acceleration = std::numeric_limits<double>::infinity();   ///< [rad/s² or m/s²], > 0
+  double effort = std::numeric_limits<double>::infinity();         ///< [N·m or N], > 0
+  std::optional<Inertia> inertia;                      ///< of the link, where it is known
+};
+
+/// Limits of the movable joints, base to tip, infinite where there is none.
+struct JointLimits {
+  JointVector lower, upper;  ///< [rad or m]
+  JointVector velocity;      ///< [rad/s or m/s]
+  JointVector acceleration;  ///< [rad/s² or m/s²]
+  JointVector effort;        ///< [N·m or N]
+};
+
+/// What the kinematics need of a movable joint: constants, laid out for one flat pass. Fixed joints are
+/// folded in, and frames are turned so that every axis is z.
+struct JointConstants {
+  Eigen::Matrix3d rotation;     ///< this joint's frame in the last one's
+  Eigen::Vector3d translation;  ///< [m]
+  bool prismatic;
+};
+
+/// A serial arm. A value: cheap to copy (copies share one immutable model), safe to use from many threads.
+class Chain {
+ public:
+  /// \param segments base to tip, fixed joints included; 1 to 16 of them movable
+  /// \throws Error with the joint and the value, where a name is empty or used twice, an axis is zero, a
+  ///     number is not finite or absurd, or limits contradict each other
+  Chain(std::string base, std::vector<Segment> segments);
+
+  /// Reads a URDF (through urdfdom).
+  /// \param source a file's path, or the XML itself
+  /// \param base, tip link names; empty: the root, the only leaf
+  /// \param acceleration [rad/s² or m/s²], one a movable joint; empty: the URDF's own, where its <limit>
+  ///     elements carry the attribute `acceleration` (our extension), else infinite
+  /// \throws Error for anything that is not a usable serial arm, with the facts
+  static Chain from_urdf(const std::string& source, const std::string& base = "",
+                         const std::string& tip = "", const std::vector<double>& acceleration = {});
+
+  int dof() const noexcept { return model_->dof; }
+  const std::string& base() const noexcept { return model_->base; }
+  const std::string& tip() const noexcept { return model_->segments.back().link_name; }
+  /// Names of the movable joints, base to tip.
+  const std::vector<std::string>& joint_names() const noexcept { return model_->joint_names; }
+  /// Types of the movable joints, base to tip.
+  const std::vector<JointType>& joint_types() const noexcept { return model_->joint_types; }
+  const JointLimits& limits() const noexcept { return model_->limits; }
+  /// Everything, fixed joints included.
+  const std::vector<Segment>& segments() const noexcept { return model_->segments; }
+
+  /// The same arm with other limits.
+  /// \throws Error where sizes or values do not fit
+  Chain with_limits(const JointLimits& limits) const;
+
+  /// Constants of the kinematics: dof() joints, then the tip's frame in the last joint's.
+  const std::array<JointConstants, kMaxJoints>& constants() const noexcept { return model_->constants; }
+  const Pose& tool() const noexcept { return model_->tool; }
+
+ private:
+  struct Model {
+    std::string base;
+    std::vector<Segment> segments;
+    std::vector<std::string> joint_names;
+    std::vector<JointType> joint_types;
+    JointLimits limits;
+    int dof = 0;
+    std::array<JointConstants, kMaxJoints> constants;
+    Pose tool = Pose::Identity();
+  };
+  std::shared_ptr<const Model> model_;
+};
+
+}  // namespace sigmaik

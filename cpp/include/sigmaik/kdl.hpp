@@ -1,0 +1,27 @@
+#pragma once
+/// \file kdl.hpp
+/// From and to KDL::Chain.
+
+#include <string>
+
+#include <kdl/chain.hpp>
+
+#include <sigmaik/chain.hpp>
+
+namespace sigmaik {
+
+/// The arm that a KDL chain describes, any of KDL's joint types. KDL knows no limits, so all are infinite, and rotary
+/// joints are Revolute, not Continuous; give limits by with_limits().
+///
+/// Offsets become part of the origins, and a scale of −1 turns the axis. A KDL segment's tip may lie off its joint's
+/// axis, a link's frame may not: such a segment becomes two, the joint with a link NAME_joint, and a fixed joint with
+/// the link NAME and its inertia. Links and joints without a name ("NoName" in KDL) become link1, joint1, ….
+/// \param base name of the base link, for which KDL has no place
+/// \throws Error where a joint has a scale other than ±1 or what else Chain refuses
+Chain from_kdl(const KDL::Chain& chain, const std::string& base = "base");
+
+/// The same chain for KDL, segment for segment (fixed joints and inertias included), as kdl_parser makes it from a
+/// URDF. Limits are lost. Mind that KDL's joints cache their last pose: a KDL::Chain is not for two threads at once.
+KDL::Chain to_kdl(const Chain& chain);
+
+}  // namespace sigmaik

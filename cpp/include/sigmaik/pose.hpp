@@ -1,0 +1,23 @@
+#pragma once
+/// \file pose.hpp
+/// Rotations and poses: what the servo's error is made of.
+
+#include <sigmaik/types.hpp>
+
+namespace sigmaik {
+
+/// Axis times angle [rad] of a rotation, angle in [0, π]. Accurate for the smallest angles and up to π,
+/// where of the two equal answers it takes the one whose first non-zero entry is positive.
+Eigen::Vector3d rotation_log(const Eigen::Matrix3d& rotation) noexcept;
+
+/// Rotation about `vector` by its length [rad] (Rodrigues).
+Eigen::Matrix3d rotation_exp(const Eigen::Vector3d& vector) noexcept;
+
+/// [e_p; e_o] that takes `current` to `target`: e_p [m] the difference of the origins, e_o [rad] the
+/// axis-angle vector of R_target R_currentᵀ; both in base axes.
+Twist pose_error(const Pose& current, const Pose& target) noexcept;
+
+/// Finite, last row 0 0 0 1, and R a rotation (RᵀR = I within 1e-6, det R > 0).
+bool is_pose(const Eigen::Matrix4d& matrix) noexcept;
+
+}  // namespace sigmaik

@@ -1,0 +1,96 @@
+#pragma once
+/// \file servo.hpp
+/// Pose or twist in, joint command out, each cycle. The only thing with a history.
+
+#include <cstdint>
+#include <limits>
+
+#include <sigmaik/chain.hpp>
+#include <sigmaik/kinematics.hpp>
+#include <sigmaik/status.hpp>
+#include <sigmaik/velocity_solver.hpp>
+
+namespace sigmaik {
+
+/// What gives way where a joint limit would be broken.
+enum class OnLimit {
+  Scale,  ///< direction kept, speed given up: all joints slow down together
+};
+
+/// Settings of a Servo.
+struct ServoOptions {
+  double dt = 1e-3;            ///< [s] > 0, the time from one update to the next
+  double gain_linear = 5.0;    ///< [1/s] ≥ 0, position error to velocity
+  double gain_angular = 5.0;   ///< [1/s] ≥ 0, orientation error to angular velocity
+  double max_linear_error = 0.25;   ///< [m] > 0: longer position errors are shortened to it
+  double max_angular_error = 1.0;   ///< [rad] > 0: longer orientation errors are shortened to it
+  /// [s] ≥ 0: over this time after reset() a pose target's command is faded in. Twists are faded in only where reset()
+  /// was told that the arm moves.
+  double soft_start = 0.1;
+  JointVector posture;         ///< (n,) nominal positions; empty: the positions given to reset()
+  double posture_gain = 0.0;   ///< [1/s] ≥ 0
+  double posture_max_speed = std::numeric_limits<double>::infinity();  ///< [rad/s or m/s] > 0, a joint
+  bool velocity_limits = true;  ///< hold the chain's velocity limits
+  OnLimit on_limit = OnLimit::Scale;
+  double length_scale = 1.0;    ///< [m], see VelocitySolver
+  Task task;                    ///< rows that matter
+};
+
+/// Answer of a cycle. By value, no heap.
+struct ServoStep {
+  JointVector q;                     ///< (n,) position command
+  JointVector qdot;                  ///< (n,) velocity command over the last dt
+  Status status = Status::BadInput;
+  Twist pose_error = Twist::Zero();  ///< target minus tip before the step, unshortened; zero for twist commands
+  Twist achieved_twist = Twist::Zero();  ///< J q̇
+  double scale = 1.0;                ///< in [0, 1]: what limits left of the rule's answer
+  std::uint16_t limiting_joints = 0;  ///< bit i: joint i's limit determines `scale`
+  TaskVector singular_values;        ///< of the weighted task Jacobian
+  std::uint8_t singular = 0;         ///< bit i: direction i is singular to the rule
+};
+
+/// Drives a chain's own reference configuration towards poses, or along twists. It integrates the command that it
+/// gives (q ← q + q̇ dt) and never reads measured positions, so sensor noise cannot enter.
+class Servo {
+ public:
+  /// \throws Error where an option is out of its range
+  Servo(Chain chain, const Method& method, const ServoOptions& options = {});
+
+  /// Starts, or starts again, at q (n,): forgets all history, and pins the posture there unless one was given.
+  /// Continuous joints take the turn of the given posture that is nearest to q.
+  /// \param qdot (n,) how the arm moves now, from which the command is faded; empty: it stands
+  /// \throws Error where a size is wrong or an entry is not finite
+  void reset(const JointVector& q, const JointVector& qdot = {});
+
+  /// One cycle towards a pose of the tip in base. Real time. A target that is not a pose is refused: BadInput, q̇ = 0.
+  ServoStep update(const Pose& target) noexcept;
+
+  /// One cycle along a twist [v; ω], base axes, at the tip's origin. Real time.
+  ServoStep update_twist(const Twist& twist) noexcept;
+
+  /// Changes the rule from the next cycle on; the rest of the history stays.
+  /// \throws Error where a parameter is out of its range
+  void set_method(const Method& method);
+
+  const Chain& chain() const noexcept { return chain_; }
+  const ServoOptions& options() const noexcept { return options_; }
+  const Method& method() const noexcept { return solver_.method(); }
+  /// (n,) where the reference stands; empty before reset().
+  const JointVector& q() const noexcept { return q_; }
+  /// Pose of the tip at q().
+  const Pose& tip() const noexcept { return state_.tip; }
+
+ private:
+  ServoStep hold(Status status) const noexcept;
+  ServoStep resolve(const Twist& twist, bool fade) noexcept;
+  JointVector posture_velocity() const noexcept;
+
+  Chain chain_;
+  ServoOptions options_;
+  VelocitySolver solver_;
+  ChainState state_;
+  JointVector q_, nominal_, qdot_start_;
+  double fade_ = 1.0;
+};
+
+}  // namespace sigmaik

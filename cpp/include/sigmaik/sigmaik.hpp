@@ -1,0 +1,32 @@
+#pragma once
+/// \file sigmaik.hpp
+/// sigmaik: a Cartesian command goes in, joint velocities come out, at and near singularities.
+///
+/// Start here. Each header needs only those above it.
+///
+///     types.hpp            JointVector, Jacobian, Twist [v; ω], Pose; sizes without heap
+///     status.hpp           Status: what a real-time call did        error.hpp   Error: what set-up refuses
+///     chain.hpp            Chain: the arm, immutable; from URDF     kdl.hpp     from and to KDL::Chain (not included)
+///     pose.hpp             rotation_log, rotation_exp, pose_error
+///     kinematics.hpp       update(chain, q, state): pose and Jacobian; jacobian_gradient
+///     spectrum.hpp         Spectrum: singular value decomposition with a warm start
+///     inverse.hpp          JParse, DampedLeastSquares, …: one rule per singular direction
+///     task.hpp             Task: which rows of a twist, in which axes
+///     velocity_solver.hpp  VelocitySolver: rule and posture → Solution
+///     batch.hpp            solve_batch: many at once
+///     servo.hpp            Servo: pose or twist in, joint command out, each cycle
+///
+/// Set-up throws Error. Calls marked "real time" are noexcept, bounded, and touch neither heap nor lock.
+
+#include <sigmaik/batch.hpp>
+#include <sigmaik/chain.hpp>
+#include <sigmaik/error.hpp>
+#include <sigmaik/inverse.hpp>
+#include <sigmaik/kinematics.hpp>
+#include <sigmaik/pose.hpp>
+#include <sigmaik/servo.hpp>
+#include <sigmaik/spectrum.hpp>
+#include <sigmaik/status.hpp>
+#include <sigmaik/task.hpp>
+#include <sigmaik/types.hpp>
+#include <sigmaik/velocity_solver.hpp>

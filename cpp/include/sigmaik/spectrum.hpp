@@ -1,0 +1,51 @@
+#pragma once
+/// \file spectrum.hpp
+/// The singular value decomposition under every rule: J = Σ σ_i u_i v_iᵀ.
+///
+/// One-sided Jacobi (Hestenes 1958): plane rotations U make the columns of Jᵀ U orthogonal; their lengths
+/// are the singular values and their directions the v_i. It does not square the condition number, finds
+/// small σ_i as accurately as the entries of J allow, and a start from the last cycle's U leaves little to
+/// rotate when J has moved little.
+
+#include <array>
+#include <cstdint>
+
+#include <sigmaik/types.hpp>
+
+namespace sigmaik {
+
+/// Result and warm start of decompose(). No heap. Start afresh by assigning Spectrum{}.
+class Spectrum {
+ public:
+  /// Decomposes an m×n matrix of finite entries. Real time.
+  ///
+  /// Singular vectors of a zero singular value are not unique: they continue the last cycle's where there
+  /// is one, and are otherwise the same on every machine and run. Signs continue too.
+  void decompose(const TaskJacobianRef& jacobian) noexcept;
+
+  int rows() const noexcept { return m_; }
+  int cols() const noexcept { return n_; }
+  /// Number of singular values, min(m, n).
+  int size() const noexcept { return m_ < n_ ? m_ : n_; }
+  /// σ_i ≥ 0, from large to small; 0 beyond size().
+  double sigma(int i) const noexcept { return sigma_[static_cast<std::size_t>(i)]; }
+  /// u_i (m,), i < m: an orthonormal basis of the task's rows.
+  auto u(int i) const noexcept { return u_.col(i).head(m_); }
+  /// v_i (n,), i < size(): orthonormal directions of the joints.
+  auto v(int i) const noexcept { return v_.col(i).head(n_); }
+  /// Sweeps that the last call took.
+  int sweeps() const noexcept { return sweeps_; }
+
+ private:
+  template <int kPadded>
+  void decompose_padded(const TaskJacobianRef& jacobian) noexcept;
+
+  int m_ = 0, n_ = 0, sweeps_ = 0;
+  std::uint32_t cycle_ = 0;  // since the start
+  std::array<double, kMaxTask> sigma_{};
+  // Entries beyond m and n stay zero: sums over them change nothing.
+  Eigen::Matrix<double, kMaxTask, kMaxTask> u_ = Eigen::Matrix<double, kMaxTask, kMaxTask>::Zero();
+  Eigen::Matrix<double, kMaxJoints, kMaxTask> v_ = Eigen::Matrix<double, kMaxJoints, kMaxTask>::Zero();
+};
+
+}  // namespace sigmaik

@@ -1,0 +1,38 @@
+#pragma once
+/// \file types.hpp
+/// Vocabulary types. Units are m, rad, s, N·m throughout. Every type is bounded, so none touches the heap.
+///
+/// Frames: a twist is [v; ω], expressed in the axes of the chain's base, for the point at the tip's origin
+/// (Pinocchio's LOCAL_WORLD_ALIGNED). Jacobians have the same row order.
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+namespace sigmaik {
+
+inline constexpr int kMaxJoints = 16;  ///< most movable joints of a chain
+inline constexpr int kMaxTask = 6;     ///< most task rows
+
+/// One number a joint: position [rad or m], velocity, … of up to 16 joints.
+using JointVector = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, kMaxJoints, 1>;
+/// One number a task row, up to 6.
+using TaskVector = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, kMaxTask, 1>;
+/// Square in the task's rows, up to 6×6.
+using TaskMatrix =
+    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kMaxTask, kMaxTask>;
+/// [v; ω], 6×n: row i is m/s or rad/s per unit joint speed.
+using Jacobian = Eigen::Matrix<double, 6, Eigen::Dynamic, Eigen::ColMajor, 6, kMaxJoints>;
+/// Any m×n with 1 ≤ m ≤ 6 and 1 ≤ n ≤ 16, for tasks that are not a whole twist.
+using TaskJacobian =
+    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kMaxTask, kMaxJoints>;
+/// [v; ω] in m/s and rad/s.
+using Twist = Eigen::Matrix<double, 6, 1>;
+/// Tip in base.
+using Pose = Eigen::Isometry3d;
+
+/// Arguments of real-time calls. A Ref to a bounded type takes vectors, blocks and rows without a heap copy.
+using JointRef = Eigen::Ref<const JointVector>;
+using TaskRef = Eigen::Ref<const TaskVector>;
+using TaskJacobianRef = Eigen::Ref<const TaskJacobian, 0, Eigen::OuterStride<>>;
+
+}  // namespace sigmaik

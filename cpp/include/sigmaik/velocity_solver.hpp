@@ -1,0 +1,66 @@
+#pragma once
+/// \file velocity_solver.hpp
+/// A rule and a posture: twist in, joint velocities out.
+
+#include <cstdint>
+
+#include <sigmaik/inverse.hpp>
+#include <sigmaik/spectrum.hpp>
+#include <sigmaik/status.hpp>
+#include <sigmaik/task.hpp>
+#include <sigmaik/types.hpp>
+
+namespace sigmaik {
+
+/// Answer of VelocitySolver::solve(). By value, no heap.
+struct Solution {
+  JointVector qdot;                  ///< (n,) [rad/s or m/s]
+  Status status = Status::BadInput;  ///< Ok, Damped or BadInput
+  TaskVector singular_values;        ///< (min(m,n),) from large to small, of the weighted task Jacobian
+  TaskVector achieved_twist;         ///< (m,) J q̇, in the rows of the J that came in
+  TaskMatrix directions;             ///< (m', m') columns u_i in the task's rows, angular ones times length_scale
+  std::uint8_t singular = 0;         ///< bit i: direction i is singular to the rule
+  /// Number of singular directions.
+  int singular_count() const noexcept;
+};
+
+/// Resolves twists at given Jacobians by one method. Keeps only the last decomposition, as a warm start.
+class VelocitySolver {
+ public:
+  /// \param length_scale [m] > 0: 1 rad/s weighs as much as length_scale m/s. Singular values of a Jacobian that mixes
+  ///     lengths and angles have no meaning without it; with length_scale in proportion to the arm, the same arm in
+  ///     other units behaves the same.
+  /// \throws Error where a parameter is out of its range
+  explicit VelocitySolver(const Method& method, double length_scale = 1.0, const Task& task = {});
+
+  /// Real time.
+  ///
+  /// \param jacobian m×n, 1 ≤ m ≤ 6, 1 ≤ n ≤ 16. With six rows the task's mask and frame apply. With as many rows as the
+  ///     mask has, it is taken as masked already. Any other m needs a task that asks for everything; its rows
+  ///     from the fourth on then count as angular.
+  /// \param twist (m,) [m/s, rad/s]
+  /// \param posture (n,) q̇_posture [rad/s or m/s]; empty: none
+  /// \param rotation tip in base; used where the task is in tool axes
+  Solution solve(const TaskJacobianRef& jacobian, const TaskRef& twist, const JointVector& posture = {},
+                 const Eigen::Matrix3d& rotation = Eigen::Matrix3d::Identity()) noexcept;
+
+  /// Forgets the warm start: the next answer does not depend on the calls before it.
+  void reset() noexcept { spectrum_ = Spectrum{}; }
+
+  /// Changes the rule; the warm start stays.
+  /// \throws Error where a parameter is out of its range
+  void set_method(const Method& method);
+
+  const Method& method() const noexcept { return method_; }
+  double length_scale() const noexcept { return length_scale_; }
+  const Task& task() const noexcept { return task_; }
+  const Spectrum& spectrum() const noexcept { return spectrum_; }
+
+ private:
+  Method method_;
+  double length_scale_;
+  Task task_;
+  Spectrum spectrum_;
+};
+
+}  // namespace sigmaik

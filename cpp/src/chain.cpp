@@ -1,0 +1,181 @@
+#include <sigmaik/chain.hpp>
+
+#include <cmath>
+#include <set>
+
+#include "message.hpp"
+
+namespace sigmaik {
+namespace {
+
+using detail::require;
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+// Beyond these a number is a slip of the pen or of units, not an arm.
+constexpr double kLargestOffset = 1e6;  // m
+constexpr double kLargestLimit = 1e9;   // rad, rad/s, …: short of infinity, which says "none"
+
+std::string label(const Segment& segment) { return "joint '" + segment.joint_name + "'"; }
+
+void check_bound(const Segment& s, const char* what, double value) {
+  require(!std::isnan(value), label(s), ": ", what, " is not a number");
+  require(std::isinf(value) || std::abs(value) <= kLargestLimit, label(s), ": ", what, " = ", value,
+          " is absurd (more than ", kLargestLimit, ")");
+}
+
+void check_limits(const Segment& s) {
+  check_bound(s, "lower", s.lower);
+  check_bound(s, "upper", s.upper);
+  require(s.lower <= s.upper, label(s), ": lower = ", s.lower, " is above upper = ", s.upper);
+  require(s.lower < kInfinity && s.upper > -kInfinity, label(s), ": no position lies between lower = ", s.lower,
+          " and upper = ", s.upper);
+  const std::pair<const char*, double> positive[] = {
+      {"velocity", s.velocity}, {"acceleration", s.acceleration}, {"effort", s.effort}};
+  for (const auto& [what, value] : positive) {
+    check_bound(s, what, value);
+    require(value > 0.0, label(s), ": ", what, " limit must be above 0 (infinite for none), got ", value);
+  }
+}
+
+void check_inertia(const Segment& s) {
+  if (!s.inertia) return;
+  const Inertia& inertia = *s.inertia;
+  require(std::isfinite(inertia.mass) && inertia.mass >= 0.0, "link '", s.link_name, "': mass = ", inertia.mass,
+          " kg must be finite and not negative");
+  require(inertia.center_of_mass.allFinite() && inertia.tensor.allFinite(), "link '", s.link_name,
+          "': its inertia has an entry that is not finite");
+}
+
+void check_origin(const Segment& s) {
+  const auto& matrix = s.origin.matrix();
+  require(matrix.allFinite(), label(s), ": its origin has an entry that is not finite");
+  const Eigen::Matrix3d r = s.origin.linear();
+  require((r.transpose() * r - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() < 1e-9 && r.determinant() > 0.0,
+          label(s), ": its origin is not a rotation and a translation");
+  require(s.origin.translation().cwiseAbs().maxCoeff() <= kLargestOffset, label(s), ": its origin lies ",
+          s.origin.translation().norm(), " m away, which is absurd");
+}
+
+// A rotation that takes z to `axis`; the identity for z itself, so that common arms keep their frames.
+Eigen::Matrix3d from_z(const Eigen::Vector3d& axis) {
+  // Exact for the axes that arms have: quarter and half turns hold only zeros and ones.
+  for (int k = 0; k < 3; ++k) {
+    for (const double sign : {1.0, -1.0}) {
+      Eigen::Vector3d unit = Eigen::Vector3d::Zero();
+      unit[k] = sign;
+      if (axis != unit) continue;
+      Eigen::Matrix3d r;
+      r.col(2) = axis;
+      r.col(0) = Eigen::Vector3d::Unit((k + 1) % 3);
+      r.col(1) = r.col(2).cross(r.col(0));
+      return k == 2 && sign > 0.0 ? Eigen::Matrix3d(Eigen::Matrix3d::Identity()) : r;
+    }
+  }
+  return Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), axis).toRotationMatrix();
+}
+
+}  // namespace
+
+const char* to_string(JointType type) noexcept {
+  switch (type) {
+    case JointType::Fixed: return "fixed";
+    case JointType::Revolute: return "revolute";
+    case JointType::Continuous: return "continuous";
+    case JointType::Prismatic: return "prismatic";
+  }
+  return "unknown";
+}
+
+Chain::Chain(std::string base, std::vector<Segment> segments) {
+  auto model = std::make_shared<Model>();
+  require(!base.empty(), "the base link needs a name");
+  require(!segments.empty(), "a chain needs at least one segment");
+
+  std::set<std::string> joints, links{base};
+  std::vector<const Segment*> movable;
+  for (Segment& s : segments) {
+    require(!s.joint_name.empty(), "the joint before link '", s.link_name, "' needs a name");
+    require(!s.link_name.empty(), label(s), ": the link that it carries needs a name");
+    require(joints.insert(s.joint_name).second, label(s), ": the name is used twice");
+    require(links.insert(s.link_name).second, label(s), ": link '", s.link_name, "' is used twice");
+    check_origin(s);
+    check_inertia(s);
+    if (s.type == JointType::Fixed) continue;
+    const double length = s.axis.norm();
+    require(s.axis.allFinite() && length > 1e-9 && length < kLargestOffset, label(s), ": axis (", s.axis.transpose(),
+            ") has no direction");
+    if (s.axis.cwiseAbs().maxCoeff() != length) s.axis /= length;  // leave unit coordinate axes exact
+    else s.axis = s.axis.array().sign();
+    if (s.type == JointType::Continuous) {
+      s.lower = -kInfinity;
+      s.upper = kInfinity;
+    }
+    check_limits(s);
+    movable.push_back(&s);
+  }
+  require(!movable.empty(), "no movable joint between '", base, "' and '", segments.back().link_name, "'");
+  require(movable.size() <= kMaxJoints, movable.size(), " movable joints between '", base, "' and '",
+          segments.back().link_name, "'; at most ", kMaxJoints, " are supported");
+
+  const int n = static_cast<int>(movable.size());
+  model->dof = n;
+  JointLimits& limits = model->limits;
+  for (JointVector* v : {&limits.lower, &limits.upper, &limits.velocity, &limits.acceleration, &limits.effort}) {
+    v->resize(n);
+  }
+
+  // Everything between two movable joints becomes one constant transform, in frames whose z is the axis.
+  Pose placement = Pose::Identity();
+  int i = 0;
+  for (const Segment& s : segments) {
+    placement = placement * s.origin;
+    if (s.type == JointType::Fixed) continue;
+    const Eigen::Matrix3d turn = from_z(s.axis);
+    placement.linear() = placement.linear() * turn;
+    JointConstants& c = model->constants[static_cast<std::size_t>(i)];
+    c.rotation = placement.linear();
+    c.translation = placement.translation();
+    c.prismatic = s.type == JointType::Prismatic;
+    placement = Pose::Identity();
+    placement.linear() = turn.transpose();
+    limits.lower[i] = s.lower;
+    limits.upper[i] = s.upper;
+    limits.velocity[i] = s.velocity;
+    limits.acceleration[i] = s.acceleration;
+    limits.effort[i] = s.effort;
+    model->joint_names.push_back(s.joint_name);
+    model->joint_types.push_back(s.type);
+    ++i;
+  }
+  model->tool = placement;
+  model->base = std::move(base);
+  model->segments = std::move(segments);
+  model_ = std::move(model);
+}
+
+Chain Chain::with_limits(const JointLimits& limits) const {
+  const std::pair<const char*, const JointVector*> all[] = {{"lower", &limits.lower},
+                                                            {"upper", &limits.upper},
+                                                            {"velocity", &limits.velocity},
+                                                            {"acceleration", &limits.acceleration},
+                                                            {"effort", &limits.effort}};
+  for (const auto& [what, values] : all) {
+    require(values->size() == dof(), what, " has ", values->size(), " entries, the chain ", dof(), " joints");
+  }
+  std::vector<Segment> segments = model_->segments;
+  int i = 0;
+  for (Segment& s : segments) {
+    if (s.type == JointType::Fixed) continue;
+    require(s.type != JointType::Continuous || (limits.lower[i] == -kInfinity && limits.upper[i] == kInfinity),
+            label(s), " is continuous: it cannot have position limits");
+    s.lower = limits.lower[i];
+    s.upper = limits.upper[i];
+    s.velocity = limits.velocity[i];
+    s.acceleration = limits.acceleration[i];
+    s.effort = limits.effort[i];
+    ++i;
+  }
+  return Chain(model_->base, std::move(segments));
+}
+
+}  // namespace sigmaik

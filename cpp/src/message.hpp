@@ -1,0 +1,24 @@
+#pragma once
+// Texts of errors, made while setting up.
+
+#include <sstream>
+#include <string>
+
+#include <sigmaik/error.hpp>
+
+namespace sigmaik::detail {
+
+template <typename... Parts>
+std::string message(const Parts&... parts) {
+  std::ostringstream text;
+  text.precision(17);
+  (text << ... << parts);
+  return text.str();
+}
+
+template <typename... Parts>
+void require(bool ok, const Parts&... parts) {
+  if (!ok) throw Error(message(parts...));
+}
+
+}  // namespace sigmaik::detail

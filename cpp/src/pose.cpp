@@ -1,0 +1,48 @@
+#include <sigmaik/pose.hpp>
+
+#include <cmath>
+
+namespace sigmaik {
+
+Eigen::Vector3d rotation_log(const Eigen::Matrix3d& rotation) noexcept {
+  // Through the unit quaternion (w, x), which is well conditioned at every angle: angle = 2 atan2(|x|, w).
+  Eigen::Quaterniond quaternion(rotation);
+  double w = quaternion.w();
+  Eigen::Vector3d x = quaternion.vec();
+  if (w < 0.0) {
+    w = -w;
+    x = -x;
+  }
+  const double sine = x.norm();
+  if (sine == 0.0) return Eigen::Vector3d::Zero();
+  if (w < 1e-15) {  // a half turn: both signs of the axis are right
+    for (int i = 0; i < 3; ++i) {
+      if (std::abs(x[i]) < 1e-9) continue;
+      if (x[i] < 0.0) x = -x;
+      break;
+    }
+  }
+  return (2.0 * std::atan2(sine, w) / sine) * x;
+}
+
+Eigen::Matrix3d rotation_exp(const Eigen::Vector3d& vector) noexcept {
+  const double angle = vector.norm();
+  if (angle == 0.0) return Eigen::Matrix3d::Identity();
+  return Eigen::AngleAxisd(angle, vector / angle).toRotationMatrix();
+}
+
+Twist pose_error(const Pose& current, const Pose& target) noexcept {
+  Twist error;
+  error.head<3>() = target.translation() - current.translation();
+  error.tail<3>() = rotation_log(target.linear() * current.linear().transpose());
+  return error;
+}
+
+bool is_pose(const Eigen::Matrix4d& matrix) noexcept {
+  if (!matrix.allFinite()) return false;
+  if (matrix.row(3) != Eigen::RowVector4d(0.0, 0.0, 0.0, 1.0)) return false;
+  const Eigen::Matrix3d r = matrix.topLeftCorner<3, 3>();
+  return (r.transpose() * r - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() <= 1e-6 && r.determinant() > 0.0;
+}
+
+}  // namespace sigmaik
