@@ -1,0 +1,149 @@
+#include "arguments.hpp"
+
+#include <cmath>
+
+namespace sigmaik::bindings {
+namespace {
+
+[[noreturn]] void refuse_shape(const char* what, const std::string& have, const char* need) {
+  throw Error(std::string(what) + " has shape " + have + ", needs " + need);
+}
+
+Array to_array(py::handle object, const char* what) {
+  if (!py::isinstance<py::array>(object) || !py::isinstance<Array>(object)) {
+    const py::array any = py::array::ensure(object);
+    if (!any) {
+      PyErr_Clear();
+      throw Error(std::string(what) + " is not an array of numbers");
+    }
+    const char kind = any.dtype().kind();
+    if (kind != 'f' && kind != 'i' && kind != 'u' && kind != 'b') {
+      throw Error(std::string(what) + " holds " + py::str(any.dtype()).cast<std::string>() + ", needs real numbers");
+    }
+  }
+  Array array = Array::ensure(object);
+  if (!array) {
+    PyErr_Clear();
+    throw Error(std::string(what) + " is not an array of numbers");
+  }
+  return array;
+}
+
+}  // namespace
+
+std::string shape_text(const py::array& array) {
+  std::string text = "(";
+  for (py::ssize_t i = 0; i < array.ndim(); ++i) {
+    text += std::to_string(array.shape(i)) + (i + 1 < array.ndim() ? ", " : array.ndim() == 1 ? "," : "");
+  }
+  return text + ")";
+}
+
+void require_finite(const Array& array, const char* what) {
+  const double* data = array.data();
+  for (py::ssize_t i = 0; i < array.size(); ++i) {
+    if (std::isfinite(data[i])) continue;
+    std::string index;
+    py::ssize_t rest = i;
+    for (py::ssize_t axis = array.ndim() - 1; axis >= 0; --axis) {
+      index = std::to_string(rest % array.shape(axis)) + (index.empty() ? "" : ", ") + index;
+      rest /= array.shape(axis);
+    }
+    throw Error(std::string(what) + "[" + index + "] = " + py::str(py::float_(data[i])).cast<std::string>() +
+                " is not finite");
+  }
+}
+
+Array array_argument(py::handle object, const char* what, std::initializer_list<py::ssize_t> shape,
+                     const char* shape_name) {
+  Array array = to_array(object, what);
+  bool fits = array.ndim() == static_cast<py::ssize_t>(shape.size());
+  py::ssize_t axis = 0;
+  for (const py::ssize_t length : shape) {
+    fits = fits && (length < 0 || array.shape(axis) == length);
+    ++axis;
+  }
+  if (!fits) refuse_shape(what, shape_text(array), shape_name);
+  require_finite(array, what);
+  return array;
+}
+
+JointVector joint_argument(py::handle object, const char* what, int n) {
+  const std::string need = n < 0 ? "(n,) with 1 ≤ n ≤ 16" : "(" + std::to_string(n) + ",)";
+  const Array array = array_argument(object, what, {n}, need.c_str());
+  if (array.size() < 1 || array.size() > kMaxJoints) refuse_shape(what, shape_text(array), need.c_str());
+  return Eigen::Map<const Eigen::VectorXd>(array.data(), array.size());
+}
+
+JointVector optional_joint_argument(py::handle object, const char* what, int n) {
+  return object.is_none() ? JointVector{} : joint_argument(object, what, n);
+}
+
+Twist twist_argument(py::handle object, const char* what) {
+  return Eigen::Map<const Twist>(array_argument(object, what, {6}, "(6,): [v; ω]").data());
+}
+
+Pose pose_argument(py::handle object, const char* what) {
+  py::object matrix = py::reinterpret_borrow<py::object>(object);
+  if (!py::isinstance<py::array>(object)) {
+    if (py::hasattr(object, "homogeneous")) {
+      matrix = object.attr("homogeneous");
+    } else if (py::hasattr(object, "as_matrix")) {
+      matrix = object.attr("as_matrix")();
+    } else if (py::hasattr(object, "A")) {
+      matrix = object.attr("A");
+    }
+  }
+  const Array array = array_argument(matrix, what, {4, 4}, "(4, 4)");
+  const Eigen::Matrix4d m = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(array.data());
+  if (!is_pose(m)) {
+    if (m.row(3) != Eigen::RowVector4d(0.0, 0.0, 0.0, 1.0)) {
+      throw Error(std::string(what) + " is not a pose: its last row must be 0 0 0 1");
+    }
+    const Eigen::Matrix3d r = m.topLeftCorner<3, 3>();
+    const double defect = (r.transpose() * r - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
+    throw Error(std::string(what) + " is not a pose: its 3×3 part is not a rotation (RᵀR − I up to " +
+                py::str(py::float_(defect)).cast<std::string>() + ", determinant " +
+                py::str(py::float_(r.determinant())).cast<std::string>() + ")");
+  }
+  Pose pose;
+  pose.matrix() = m;
+  return pose;
+}
+
+Eigen::Matrix3d rotation_argument(py::handle object, const char* what) {
+  const Array array = array_argument(object, what, {3, 3}, "(3, 3)");
+  Eigen::Matrix4d m = Eigen::Matrix4d::Identity();
+  m.topLeftCorner<3, 3>() = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(array.data());
+  if (!is_pose(m)) throw Error(std::string(what) + " is not a rotation");
+  return m.topLeftCorner<3, 3>();
+}
+
+TaskJacobian jacobian_argument(py::handle object, const char* what) {
+  constexpr const char* kNeed = "(m, n) with 1 ≤ m ≤ 6 and 1 ≤ n ≤ 16";
+  const Array array = array_argument(object, what, {-1, -1}, kNeed);
+  const auto m = array.shape(0), n = array.shape(1);
+  if (m < 1 || m > kMaxTask || n < 1 || n > kMaxJoints) refuse_shape(what, shape_text(array), kNeed);
+  return Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(array.data(), m, n);
+}
+
+Task task_argument(py::handle mask, const std::string& frame) {
+  Task task;
+  if (!mask.is_none()) {
+    const Array array = array_argument(mask, "mask", {6}, "(6,): vx vy vz ωx ωy ωz");
+    for (py::ssize_t i = 0; i < 6; ++i) {
+      const double entry = array.data()[i];
+      if (entry != 0.0 && entry != 1.0) {
+        throw Error("mask[" + std::to_string(i) + "] = " + py::str(py::float_(entry)).cast<std::string>() +
+                    " must be 0 or 1");
+      }
+      task.mask[static_cast<std::size_t>(i)] = entry == 1.0;
+    }
+  }
+  if (frame != "base" && frame != "tool") throw Error("frame = '" + frame + "' must be 'base' or 'tool'");
+  task.frame = frame == "tool" ? Frame::Tool : Frame::Base;
+  task.validate();
+  return task;
+}
+
+}  // namespace sigmaik::bindings

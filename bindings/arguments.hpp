@@ -1,0 +1,71 @@
+#pragma once
+// From Python's arguments to bounded vectors and back. Every refusal is a sigmaik.Error that names the argument, the
+// shape it has and the shape it needs. Sizes are checked before anything is copied into a bounded type.
+
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+
+#include <optional>
+#include <string>
+
+#include <sigmaik/sigmaik.hpp>
+
+namespace sigmaik::bindings {
+
+namespace py = pybind11;
+
+using Array = py::array_t<double, py::array::c_style | py::array::forcecast>;
+
+/// "(6, 7)".
+std::string shape_text(const py::array& array);
+
+/// Throws unless every entry is finite.
+void require_finite(const Array& array, const char* what);
+
+/// A finite array of the given shape; −1 matches any length.
+Array array_argument(py::handle object, const char* what, std::initializer_list<py::ssize_t> shape,
+                     const char* shape_name);
+
+/// (n,) for a chain of n joints, or any size from 1 to 16 where n < 0.
+JointVector joint_argument(py::handle object, const char* what, int n);
+
+/// Like joint_argument, empty for None.
+JointVector optional_joint_argument(py::handle object, const char* what, int n);
+
+Twist twist_argument(py::handle object, const char* what);
+
+/// 4×4, or what carries one: pinocchio's SE3 (.homogeneous), spatialmath's SE3 (.A), jaxlie's and mink's SE3
+/// (.as_matrix()).
+Pose pose_argument(py::handle object, const char* what);
+
+/// 3×3, checked to be a rotation.
+Eigen::Matrix3d rotation_argument(py::handle object, const char* what);
+
+/// m×n, 1 ≤ m ≤ 6, 1 ≤ n ≤ 16.
+TaskJacobian jacobian_argument(py::handle object, const char* what);
+
+/// Mask (six truth values, None for all) and frame ("base" or "tool").
+Task task_argument(py::handle mask, const std::string& frame);
+
+/// A new numpy array, in C order.
+template <typename Derived>
+py::array_t<double> to_numpy(const Eigen::MatrixBase<Derived>& values) {
+  if constexpr (Derived::ColsAtCompileTime == 1) {
+    py::array_t<double> out(values.rows());
+    Eigen::Map<Eigen::VectorXd>(out.mutable_data(), values.rows()) = values;
+    return out;
+  } else {
+    py::array_t<double> out({values.rows(), values.cols()});
+    Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(out.mutable_data(), values.rows(),
+                                                                                      values.cols()) = values;
+    return out;
+  }
+}
+
+void bind_status(py::module_& m);
+void bind_chain(py::module_& m);
+void bind_methods(py::module_& m);
+void bind_solver(py::module_& m);
+void bind_servo(py::module_& m);
+
+}  // namespace sigmaik::bindings

@@ -1,0 +1,174 @@
+#include <pybind11/stl.h>
+
+#include <cmath>
+#include <vector>
+
+#include "arguments.hpp"
+
+namespace sigmaik::bindings {
+namespace {
+
+// Calls fill(q, out) for q (n,), or for every row of q (B, n) without the GIL; `shape` is that of one result.
+template <typename Fill>
+py::array_t<double> map_configurations(const Chain& chain, const py::object& object, std::vector<py::ssize_t> shape,
+                                       Fill fill) {
+  const int n = chain.dof();
+  const std::string need = "(" + std::to_string(n) + ",) or (B, " + std::to_string(n) + ")";
+  py::array any = py::array::ensure(object);
+  if (!any) PyErr_Clear();
+  const bool batch = any && any.ndim() == 2;
+  const Array q = batch ? array_argument(any, "q", {-1, n}, need.c_str()) : array_argument(object, "q", {n}, need.c_str());
+  const py::ssize_t count = batch ? q.shape(0) : 1;
+  py::ssize_t size = 1;
+  for (const py::ssize_t length : shape) size *= length;
+  if (batch) shape.insert(shape.begin(), count);
+  py::array_t<double> out(shape);
+  double* data = out.mutable_data();
+  const double* from = q.data();
+  {
+    py::gil_scoped_release release;
+    for (py::ssize_t b = 0; b < count; ++b) {
+      fill(JointVector(Eigen::Map<const Eigen::VectorXd>(from + b * n, n)), data + b * size);
+    }
+  }
+  return out;
+}
+
+template <int kRows>
+using RowMajor = Eigen::Matrix<double, kRows, Eigen::Dynamic, Eigen::RowMajor>;
+
+JointVector limit_argument(const py::object& object, const char* what, const JointVector& otherwise) {
+  if (object.is_none()) return otherwise;
+  // Infinite entries are what "no limit" looks like, so finiteness is Chain's business here.
+  Array array = Array::ensure(object);
+  if (!array) {
+    PyErr_Clear();
+    throw Error(std::string(what) + " is not an array of numbers");
+  }
+  if (array.ndim() == 0) return JointVector::Constant(otherwise.size(), *array.data());
+  if (array.ndim() != 1 || array.size() != otherwise.size()) {
+    throw Error(std::string(what) + " has shape " + shape_text(array) + ", needs (" +
+                std::to_string(otherwise.size()) + ",) or one number");
+  }
+  return Eigen::Map<const Eigen::VectorXd>(array.data(), array.size());
+}
+
+}  // namespace
+
+void bind_chain(py::module_& m) {
+  py::class_<JointLimits>(m, "JointLimits", "Limits of a chain's movable joints, (n,) each, infinite where there is none.")
+      .def_property_readonly("lower", [](const JointLimits& l) { return to_numpy(l.lower); }, "(n,) [rad or m]")
+      .def_property_readonly("upper", [](const JointLimits& l) { return to_numpy(l.upper); }, "(n,) [rad or m]")
+      .def_property_readonly("velocity", [](const JointLimits& l) { return to_numpy(l.velocity); },
+                             "(n,) [rad/s or m/s]")
+      .def_property_readonly("acceleration", [](const JointLimits& l) { return to_numpy(l.acceleration); },
+                             "(n,) [rad/s² or m/s²]")
+      .def_property_readonly("effort", [](const JointLimits& l) { return to_numpy(l.effort); }, "(n,) [N·m or N]");
+
+  py::class_<Chain>(m, "Chain",
+                    "A serial arm: joints, limits and inertias between a base and a tip. Immutable, safe to share.\n\n"
+                    "Twists and Jacobians are [v; ω], in the axes of the base, at the tip's origin\n"
+                    "(Pinocchio's LOCAL_WORLD_ALIGNED). Poses are 4×4, tip in base.")
+      .def_static(
+          "from_urdf",
+          [](const py::object& source, const std::optional<std::string>& base, const std::optional<std::string>& tip,
+             const py::object& acceleration) {
+            const auto text = py::module_::import("os").attr("fspath")(source).cast<std::string>();
+            std::vector<double> limits;
+            if (!acceleration.is_none()) {
+              const Array array = Array::ensure(acceleration);
+              if (!array || array.ndim() != 1) {
+                PyErr_Clear();
+                throw Error("acceleration must be a list of numbers, one a movable joint");
+              }
+              limits.assign(array.data(), array.data() + array.size());
+            }
+            return Chain::from_urdf(text, base.value_or(""), tip.value_or(""), limits);
+          },
+          py::arg("source"), py::arg("base") = py::none(), py::arg("tip") = py::none(),
+          py::arg("acceleration") = py::none(),
+          "Reads a URDF.\n\n"
+          "source: a file's path, or the XML text.\n"
+          "base, tip: link names; by default the root, and the only leaf.\n"
+          "acceleration: (n,) limits [rad/s² or m/s²]; by default those of the file, whose <limit> elements may carry\n"
+          "an attribute `acceleration` (an extension), else infinite.\n\n"
+          "Raises Error with the facts for anything that is not a usable serial arm of 1 to 16 movable joints.")
+      .def_property_readonly("dof", &Chain::dof, "Number of movable joints, n.")
+      .def_property_readonly("base", &Chain::base, "Name of the base link.")
+      .def_property_readonly("tip", &Chain::tip, "Name of the tip link.")
+      .def_property_readonly("joint_names", [](const Chain& c) { return py::tuple(py::cast(c.joint_names())); },
+                             "Names of the movable joints, base to tip.")
+      .def_property_readonly(
+          "joint_types",
+          [](const Chain& c) {
+            py::list types;
+            for (const JointType type : c.joint_types()) types.append(to_string(type));
+            return py::tuple(types);
+          },
+          "'revolute', 'continuous' or 'prismatic' for every movable joint, base to tip.")
+      .def_property_readonly("limits", &Chain::limits, "Limits of the movable joints.")
+      .def(
+          "with_limits",
+          [](const Chain& c, const py::object& lower, const py::object& upper, const py::object& velocity,
+             const py::object& acceleration, const py::object& effort) {
+            const JointLimits& old = c.limits();
+            return c.with_limits({limit_argument(lower, "lower", old.lower), limit_argument(upper, "upper", old.upper),
+                                  limit_argument(velocity, "velocity", old.velocity),
+                                  limit_argument(acceleration, "acceleration", old.acceleration),
+                                  limit_argument(effort, "effort", old.effort)});
+          },
+          py::kw_only(), py::arg("lower") = py::none(), py::arg("upper") = py::none(),
+          py::arg("velocity") = py::none(), py::arg("acceleration") = py::none(), py::arg("effort") = py::none(),
+          "The same arm with other limits: (n,) or one number each, infinite for none; None keeps what there is.")
+      .def(
+          "pose",
+          [](const Chain& c, const py::object& q) {
+            return map_configurations(c, q, {4, 4}, [&c](const JointVector& joints, double* out) {
+              Eigen::Map<Eigen::Matrix<double, 4, 4, Eigen::RowMajor>> result(out);
+              result = pose(c, joints).matrix();
+            });
+          },
+          py::arg("q"), "Pose (4, 4) of the tip in the base at q (n,) [rad or m]; (B, 4, 4) at q (B, n).")
+      .def(
+          "jacobian",
+          [](const Chain& c, const py::object& q) {
+            ChainState state;
+            return map_configurations(c, q, {6, c.dof()}, [&c, &state](const JointVector& joints, double* out) {
+              update(c, joints, state);
+              Eigen::Map<RowMajor<6>>(out, 6, c.dof()) = state.jacobian;
+            });
+          },
+          py::arg("q"),
+          "Jacobian (6, n) at q (n,): rows [v; ω] in base axes at the tip's origin; (B, 6, n) at q (B, n).")
+      .def(
+          "jacobian_gradient",
+          [](const Chain& c, const py::object& q) {
+            ChainState state;
+            JacobianGradient gradient;
+            const int n = c.dof();
+            return map_configurations(c, q, {n, 6, n}, [&](const JointVector& joints, double* out) {
+              update(c, joints, state);
+              jacobian_gradient(state.jacobian, gradient);
+              for (int k = 0; k < n; ++k) {
+                Eigen::Map<RowMajor<6>>(out + k * 6 * n, 6, n) = gradient[static_cast<std::size_t>(k)];
+              }
+            });
+          },
+          py::arg("q"), "∂J/∂q_k (n, 6, n) at q (n,), k first; (B, n, 6, n) at q (B, n).")
+      .def(
+          "random_configuration",
+          [](const Chain& c, const py::object& seed) {
+            const JointVector lower = c.limits().lower.unaryExpr([](double x) { return std::isfinite(x) ? x : -M_PI; });
+            const JointVector upper = c.limits().upper.unaryExpr([](double x) { return std::isfinite(x) ? x : M_PI; });
+            const py::object generator = py::module_::import("numpy.random").attr("default_rng")(seed);
+            return generator.attr("uniform")(to_numpy(lower), to_numpy(upper));
+          },
+          py::arg("seed") = py::none(),
+          "Positions (n,) drawn uniformly within the limits, within ±π where there are none.\n\n"
+          "seed: what numpy.random.default_rng takes, a Generator included.")
+      .def("__repr__", [](const Chain& c) {
+        return "Chain('" + c.base() + "' → '" + c.tip() + "', " + std::to_string(c.dof()) + " joints)";
+      });
+}
+
+}  // namespace sigmaik::bindings

@@ -1,0 +1,145 @@
+#include <pybind11/stl.h>
+
+#include "arguments.hpp"
+
+namespace sigmaik::bindings {
+namespace {
+
+OnLimit on_limit_argument(const std::string& text) {
+  if (text == "scale") return OnLimit::Scale;
+  throw Error("on_limit = '" + text + "' must be 'scale'");
+}
+
+// Python gets an exception where C++ gets a status; the servo keeps its state and holds.
+void require_started(const Servo& servo) {
+  if (servo.q().size() == 0) throw Error("the servo has no start: call reset(q) first");
+}
+
+ServoStep checked(const ServoStep& step) {
+  if (step.status == Status::BadInput) throw Error("the command is too large for floating-point numbers");
+  return step;
+}
+
+}  // namespace
+
+void bind_servo(py::module_& m) {
+  py::class_<ServoStep>(m, "ServoStep", "Answer of one cycle of a Servo.")
+      .def_property_readonly("q", [](const ServoStep& s) { return to_numpy(s.q); }, "(n,) position command [rad or m]")
+      .def_property_readonly("qdot", [](const ServoStep& s) { return to_numpy(s.qdot); },
+                             "(n,) velocity command over the last dt [rad/s or m/s]")
+      .def_readonly("status", &ServoStep::status, "What the cycle did, see Status.")
+      .def_property_readonly("pose_error", [](const ServoStep& s) { return to_numpy(s.pose_error); },
+                             "(6,) [m, rad] target minus tip before the step, unshortened; zero for twist commands")
+      .def_property_readonly("achieved_twist", [](const ServoStep& s) { return to_numpy(s.achieved_twist); },
+                             "(6,) J q̇ [m/s, rad/s]")
+      .def_readonly("scale", &ServoStep::scale, "In [0, 1]: what limits left of the rule's answer.")
+      .def_property_readonly(
+          "limiting_joints",
+          [](const ServoStep& s) {
+            py::list joints;
+            for (int i = 0; i < s.q.size(); ++i) {
+              if ((s.limiting_joints >> i & 1u) != 0) joints.append(i);
+            }
+            return py::tuple(joints);
+          },
+          "Indices of the joints whose limits determine `scale`.")
+      .def_property_readonly("singular_values", [](const ServoStep& s) { return to_numpy(s.singular_values); },
+                             "Singular values of the weighted task Jacobian, from large to small.")
+      .def_property_readonly(
+          "singular",
+          [](const ServoStep& s) {
+            py::array_t<bool> out(s.singular_values.size());
+            for (py::ssize_t i = 0; i < out.size(); ++i) out.mutable_data()[i] = (s.singular >> i & 1u) != 0;
+            return out;
+          },
+          "Truth values: the rule does not treat direction i as regular.")
+      .def("__repr__", [](const ServoStep& s) {
+        return std::string("ServoStep(status=") + to_string(s.status) +
+               ", qdot=" + py::str(to_numpy(s.qdot)).cast<std::string>() + ")";
+      });
+
+  py::class_<Servo>(m, "Servo",
+                    "Drives a chain's reference configuration towards poses, or along twists, one cycle a call.\n\n"
+                    "It integrates its own command (q ← q + q̇ dt) and reads no measured positions.")
+      .def(py::init([](const Chain& chain, const Method& method, double dt, double gain_linear, double gain_angular,
+                       double max_linear_error, double max_angular_error, double soft_start, const py::object& posture,
+                       double posture_gain, double posture_max_speed, bool velocity_limits, const std::string& on_limit,
+                       double length_scale, const py::object& mask, const std::string& frame) {
+             ServoOptions options;
+             options.dt = dt;
+             options.gain_linear = gain_linear;
+             options.gain_angular = gain_angular;
+             options.max_linear_error = max_linear_error;
+             options.max_angular_error = max_angular_error;
+             options.soft_start = soft_start;
+             options.posture = optional_joint_argument(posture, "posture", chain.dof());
+             options.posture_gain = posture_gain;
+             options.posture_max_speed = posture_max_speed;
+             options.velocity_limits = velocity_limits;
+             options.on_limit = on_limit_argument(on_limit);
+             options.length_scale = length_scale;
+             options.task = task_argument(mask, frame);
+             return Servo(chain, method, options);
+           }),
+           py::arg("chain"), py::arg("method"), py::arg("dt") = 1e-3, py::kw_only(),
+           py::arg("gain_linear") = ServoOptions{}.gain_linear, py::arg("gain_angular") = ServoOptions{}.gain_angular,
+           py::arg("max_linear_error") = ServoOptions{}.max_linear_error,
+           py::arg("max_angular_error") = ServoOptions{}.max_angular_error,
+           py::arg("soft_start") = ServoOptions{}.soft_start, py::arg("posture") = py::none(),
+           py::arg("posture_gain") = ServoOptions{}.posture_gain,
+           py::arg("posture_max_speed") = ServoOptions{}.posture_max_speed, py::arg("velocity_limits") = true,
+           py::arg("on_limit") = "scale", py::arg("length_scale") = 1.0, py::arg("mask") = py::none(),
+           py::arg("frame") = "base",
+           "dt: [s] from one update to the next.\n"
+           "gain_linear, gain_angular: [1/s] from pose error to twist.\n"
+           "max_linear_error [m], max_angular_error [rad]: longer errors are shortened to it.\n"
+           "soft_start: [s] over which a pose target's command is faded in after reset(); twists only where reset()\n"
+           "    was told that the arm moves.\n"
+           "posture: (n,) nominal positions, by default those given to reset(); posture_gain [1/s];\n"
+           "posture_max_speed [rad/s or m/s] caps each joint.\n"
+           "velocity_limits: hold the chain's; on_limit 'scale': all joints slow down together.\n"
+           "length_scale, mask, frame: as for VelocitySolver.")
+      .def(
+          "reset",
+          [](Servo& s, const py::object& q, const py::object& qdot) {
+            s.reset(joint_argument(q, "q", s.chain().dof()), optional_joint_argument(qdot, "qdot", s.chain().dof()));
+          },
+          py::arg("q"), py::arg("qdot") = py::none(),
+          "Starts, or starts again, at q (n,): forgets all history, and pins the posture there unless one was given.\n\n"
+          "qdot: (n,) how the arm moves now, from which the command is faded; None: it stands.")
+      .def(
+          "update",
+          [](Servo& s, const py::object& target) {
+            require_started(s);
+            return checked(s.update(pose_argument(target, "target")));
+          },
+          py::arg("target"),
+          "One cycle towards a pose (4, 4) of the tip in the base.\n\n"
+          "Raises Error, and holds, where the target is not a pose.")
+      .def(
+          "update_twist",
+          [](Servo& s, const py::object& twist) {
+            require_started(s);
+            return checked(s.update_twist(twist_argument(twist, "twist")));
+          },
+          py::arg("twist"), "One cycle along a twist (6,) [v; ω], base axes, at the tip's origin.")
+      .def_property("method", &Servo::method, &Servo::set_method, "The rule; may be changed between cycles.")
+      .def_property_readonly("chain", &Servo::chain)
+      .def_property_readonly("dt", [](const Servo& s) { return s.options().dt; }, "[s]")
+      .def_property_readonly(
+          "q",
+          [](const Servo& s) {
+            require_started(s);
+            return to_numpy(s.q());
+          },
+          "(n,) where the reference stands.")
+      .def_property_readonly(
+          "pose",
+          [](const Servo& s) {
+            require_started(s);
+            return to_numpy(s.tip().matrix());
+          },
+          "(4, 4) tip in base at q.");
+}
+
+}  // namespace sigmaik::bindings

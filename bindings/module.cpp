@@ -1,0 +1,53 @@
+#include <pybind11/native_enum.h>
+
+#include "arguments.hpp"
+
+namespace sigmaik::bindings {
+
+void bind_status(py::module_& m) {
+  py::register_exception<Error>(m, "Error", PyExc_ValueError)
+      .attr("__doc__") = "What set-up and checked calls refuse. The text carries the facts.";
+  py::native_enum<Status>(m, "Status", "enum.IntEnum",
+                          "What a call did, ordered from the best to the worst. Degraded is not failed: everything "
+                          "below BAD_INPUT is finite, inside the stated bound, and may be sent to the arm.")
+      .value("OK", Status::Ok, "done as asked")
+      .value("DAMPED", Status::Damped, "near a singularity: part of the command is damped, or cannot be done")
+      .value("LIMITED", Status::Limited, "a joint limit holds part of the command back")
+      .value("HOLDING", Status::Holding, "no motion: there is no target, or none is allowed")
+      .value("BAD_INPUT", Status::BadInput, "NaN, infinite, not a rotation, or a wrong size: zero velocity")
+      .finalize();
+
+  m.def(
+      "pose_error",
+      [](const py::object& current, const py::object& target) {
+        return to_numpy(pose_error(pose_argument(current, "current"), pose_argument(target, "target")));
+      },
+      py::arg("current"), py::arg("target"),
+      "[e_p; e_o] (6,) that takes `current` to `target` (4×4 poses in one frame).\n\n"
+      "e_p [m] is the difference of the origins, e_o [rad] the axis-angle vector of R_target R_currentᵀ, both in the\n"
+      "axes of that frame. Right up to and at a half turn.");
+  m.def(
+      "rotation_log",
+      [](const py::object& rotation) { return to_numpy(rotation_log(rotation_argument(rotation, "rotation"))); },
+      py::arg("rotation"), "Axis times angle [rad] (3,) of a 3×3 rotation, angle in [0, π].");
+  m.def(
+      "rotation_exp",
+      [](const py::object& vector) {
+        const Array array = array_argument(vector, "vector", {3}, "(3,)");
+        return to_numpy(rotation_exp(Eigen::Map<const Eigen::Vector3d>(array.data())));
+      },
+      py::arg("vector"), "Rotation (3, 3) about `vector` by its length [rad].");
+}
+
+}  // namespace sigmaik::bindings
+
+PYBIND11_MODULE(_core, m) {
+  using namespace sigmaik::bindings;
+  m.doc() = "The compiled part of sigmaik. Import sigmaik instead.";
+  m.attr("__version__") = SIGMAIK_VERSION;
+  bind_status(m);
+  bind_chain(m);
+  bind_methods(m);
+  bind_solver(m);
+  bind_servo(m);
+}

@@ -1,0 +1,64 @@
+"""sigmaik: a Cartesian command goes in, joint velocities come out, at and near singularities.
+
+    import sigmaik as sk
+
+    arm = sk.robots.load("ufactory_xarm7")              # or sk.Chain.from_urdf("arm.urdf")
+    servo = sk.Servo(arm, sk.JParse(gamma=0.1), dt=1e-3)
+    servo.reset(q)                                      # (n,) [rad or m]
+    step = servo.update(target)                         # (4, 4), tip in base; or servo.update_twist([v; ω])
+    step.q, step.qdot, step.status
+
+Units are m, rad, s, N·m. Twists and Jacobians are [v; ω], in base axes, at the tip's origin.
+"""
+
+from . import robots
+from ._core import (
+    AdaptiveDampedLeastSquares,
+    Chain,
+    DampedLeastSquares,
+    Error,
+    JacobianProjection,
+    JacobianSafety,
+    JacobianSafetyProjection,
+    JointLimits,
+    JParse,
+    PseudoInverse,
+    SelectivelyDampedLeastSquares,
+    Servo,
+    ServoStep,
+    Solution,
+    Spectrum,
+    Status,
+    VelocitySolver,
+    __version__,
+    pose_error,
+    rotation_exp,
+    rotation_log,
+    solve_batch,
+)
+
+__all__ = [
+    "AdaptiveDampedLeastSquares",
+    "Chain",
+    "DampedLeastSquares",
+    "Error",
+    "JParse",
+    "JacobianProjection",
+    "JacobianSafety",
+    "JacobianSafetyProjection",
+    "JointLimits",
+    "PseudoInverse",
+    "SelectivelyDampedLeastSquares",
+    "Servo",
+    "ServoStep",
+    "Solution",
+    "Spectrum",
+    "Status",
+    "VelocitySolver",
+    "__version__",
+    "pose_error",
+    "robots",
+    "rotation_exp",
+    "rotation_log",
+    "solve_batch",
+]
