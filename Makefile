@@ -1,0 +1,65 @@
+# Thin: each target is a line or two around CMake, pip, ctest and pytest. `make help` lists them.
+PYTHON ?= python3
+WERROR ?= $(if $(CI),ON,OFF)
+BIN := .venv/bin
+SOURCES := $(shell find CMakeLists.txt cpp bindings python -type f -not -path '*/__pycache__/*' -not -path 'cpp/examples/*')
+
+# One compiler by one name for CMake and pip: ccache then compiles the core once for both.
+export CXX
+export SKBUILD_BUILD_DIR := build/python
+export SKBUILD_CMAKE_DEFINE := SIGMAIK_WERROR=$(WERROR)
+
+.NOTPARALLEL:
+.PHONY: help demo test bench wheel build install stubs stubs-check clean system
+
+help:  ## this list
+	@sed -n 's/^\([a-z-]*\):.*## /  make \1  /p' Makefile | awk '{printf "  %s %-12s", $$1, $$2; $$1=$$2=""; print}'
+
+demo: .venv/.demo .venv/.package  ## a 7-joint arm driven beyond its reach by every method: a plot and its numbers
+	$(BIN)/sigmaik reach --robot ufactory_xarm7 --path extended-line --method all --out build/demo
+
+test: build .venv/.test .venv/.package  ## everything: install, stubs, types, C++ tests, Python tests
+	tools/check_install.sh build/release
+	tools/stubs.sh --check
+	$(BIN)/mypy
+	ctest --test-dir build/release --output-on-failure
+	$(BIN)/python -m pytest
+
+bench: build  ## C++ benchmarks, also as build/bench.json
+	build/release/sigmaik_bench --benchmark_out=build/bench.json --benchmark_out_format=json
+
+wheel: .venv/.build  ## a wheel that carries its libraries, in dist/, checked in an empty environment
+	tools/build_wheel.sh
+	tools/check_wheel.sh dist/*.whl
+
+build: build/release/build.ninja  ## C++ library, tests, examples and benchmarks, in build/release
+	cmake --build build/release
+
+install: .venv/.package  ## the Python package, in .venv
+
+stubs: .venv/.test .venv/.package  ## write python/sigmaik/_core.pyi from the compiled module
+	tools/stubs.sh
+
+stubs-check: .venv/.test .venv/.package  ## compare python/sigmaik/_core.pyi with the compiled module
+	tools/stubs.sh --check
+
+clean:  ## remove what was built; .venv stays
+	rm -rf build dist .venv/.package
+
+system:
+	@tools/setup_system.sh $(PYTHON)
+
+build/release/build.ninja: CMakePresets.json | system
+	cmake --preset release -DSIGMAIK_WERROR=$(WERROR)
+
+.venv/pyvenv.cfg: | system
+	$(PYTHON) -m venv .venv
+
+# .build, .demo and .test: the packages that building, the demo and the tests need.
+.venv/.build .venv/.demo .venv/.test: .venv/.%: .venv/pyvenv.cfg pyproject.toml tools/requirements.py
+	$(BIN)/python -m pip install -q $$($(BIN)/python tools/requirements.py $*)
+	@touch $@
+
+.venv/.package: $(SOURCES) pyproject.toml README.md LICENSE .venv/.build | system
+	$(BIN)/python -m pip install -q --no-deps --no-build-isolation --force-reinstall .
+	@touch $@
