@@ -1,4 +1,4 @@
-#include <sstream>
+#include <optional>
 
 #include "arguments.hpp"
 

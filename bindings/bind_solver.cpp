@@ -1,5 +1,3 @@
-#include <pybind11/stl.h>
-
 #include "arguments.hpp"
 
 namespace sigmaik::bindings {

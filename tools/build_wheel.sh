@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Builds a wheel with the Python of .venv into dist/, and puts KDL, urdfdom, TinyXML and console_bridge into it.
+# Builds a wheel with the Python of .venv into dist/, and puts the libraries that it needs into it: what it uses of
+# KDL, urdfdom, TinyXML, TinyXML-2 and console_bridge.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 export PATH="$PWD/.venv/bin:$PATH"

@@ -29,9 +29,10 @@ import numpy as np
 import sigmaik as sk
 
 chain = sk.robots.load("ufactory_xarm7")
-q = np.full(chain.dof, 0.4)
+q = np.ones(chain.dof)
 twist = np.array([0.05, 0.0, 0.0, 0.0, 0.0, 0.0])
 solution = sk.VelocitySolver(sk.JParse()).solve(chain.jacobian(q), twist)
+assert solution.status == sk.Status.OK, solution
 assert np.allclose(chain.jacobian(q) @ solution.qdot, twist, atol=1e-9), solution
 
 loaded = {line.split()[-1] for line in open("/proc/self/maps") if "/" in line}

@@ -5,10 +5,18 @@ cd "$(dirname "$0")/.."
 out=build/stubs
 rm -rf "$out"
 .venv/bin/python -m pybind11_stubgen sigmaik._core --output-dir "$out" --exit-code
-sed -i "s/^__version__: str = .*/__version__: str/" "$out/sigmaik/_core.pyi"  # CMakeLists.txt has the version
+
+# What pybind11-stubgen does not know: how a stub spells the members of an enum, that Enum has types for its own
+# methods, and that CMakeLists.txt is the only place with the version.
+sed -zEi '
+  s/\n    ([A-Z_]+): typing\.ClassVar\[\w+\]/\n    \1 = .../g
+  s/\n    @classmethod\n    def __new__\(cls, value\):\n        \.\.\.//g
+  s/\n    def __format__\(self, format_spec\):\n        \.\.\.//g
+  s/\n__version__: str = [^\n]*/\n__version__: str/
+  s/ +\n/\n/g' "$out/sigmaik/_core.pyi"
 
 if [[ ${1:-} == --check ]]; then
-  if ! diff -ru python/sigmaik/_core.pyi "$out/sigmaik/_core.pyi"; then
+  if ! diff -u python/sigmaik/_core.pyi "$out/sigmaik/_core.pyi"; then
     echo "python/sigmaik/_core.pyi is not what the module says: run make stubs, and commit it" >&2
     exit 1
   fi

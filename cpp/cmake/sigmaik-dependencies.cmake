@@ -19,6 +19,7 @@ endif()
 
 # Private to sigmaik: only who links it statically, or builds it, needs to find them.
 if(NOT DEFINED sigmaik_IS_STATIC OR sigmaik_IS_STATIC)
+  find_dependency(Threads)
   find_dependency(console_bridge)
   find_dependency(urdfdom)
 

@@ -56,22 +56,17 @@ void check_origin(const Segment& s) {
           s.origin.translation().norm(), " m away, which is absurd");
 }
 
-// A rotation that takes z to `axis`; the identity for z itself, so that common arms keep their frames.
+// A rotation that takes z to `axis` (Duff et al. 2017, "Building an orthonormal basis, revisited"): exact for coordinate
+// axes, the identity for z, and accurate close to −z, where the shortest rotation is not.
 Eigen::Matrix3d from_z(const Eigen::Vector3d& axis) {
-  // Exact for the axes that arms have: quarter and half turns hold only zeros and ones.
-  for (int k = 0; k < 3; ++k) {
-    for (const double sign : {1.0, -1.0}) {
-      Eigen::Vector3d unit = Eigen::Vector3d::Zero();
-      unit[k] = sign;
-      if (axis != unit) continue;
-      Eigen::Matrix3d r;
-      r.col(2) = axis;
-      r.col(0) = Eigen::Vector3d::Unit((k + 1) % 3);
-      r.col(1) = r.col(2).cross(r.col(0));
-      return k == 2 && sign > 0.0 ? Eigen::Matrix3d(Eigen::Matrix3d::Identity()) : r;
-    }
-  }
-  return Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), axis).toRotationMatrix();
+  const double x = axis.x(), y = axis.y(), z = axis.z();
+  const double sign = std::copysign(1.0, z);
+  const double a = -1.0 / (sign + z), b = x * y * a;
+  Eigen::Matrix3d r;
+  r << 1.0 + sign * x * x * a, b,                x,
+       sign * b,               sign + y * y * a, y,
+       -sign * x,              -y,               z;
+  return r;
 }
 
 }  // namespace
@@ -104,8 +99,7 @@ Chain::Chain(std::string base, std::vector<Segment> segments) {
     const double length = s.axis.norm();
     require(s.axis.allFinite() && length > 1e-9 && length < kLargestOffset, label(s), ": axis (", s.axis.transpose(),
             ") has no direction");
-    if (s.axis.cwiseAbs().maxCoeff() != length) s.axis /= length;  // leave unit coordinate axes exact
-    else s.axis = s.axis.array().sign();
+    s.axis /= length;
     if (s.type == JointType::Continuous) {
       s.lower = -kInfinity;
       s.upper = kInfinity;

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <type_traits>
 
 #include "message.hpp"
 
@@ -120,13 +122,6 @@ double selective_bound(const Spectrum& spectrum, int i, double max_speed) noexce
   return max_speed * std::min(1.0, spectrum.sigma(i) / spectrum.sigma(0) / moved);
 }
 
-bool clamp_speed(JointVector& qdot, double bound) noexcept {
-  const double largest = qdot.cwiseAbs().maxCoeff();
-  if (largest <= bound) return false;
-  qdot *= bound / largest;
-  return true;
-}
-
 // Throws unless low < value ≤ high (low ≤ value where `closed`).
 void check(const char* what, double value, double low, double high, bool closed = false) {
   require((closed ? value >= low : value > low) && value <= high && std::isfinite(value), what, " = ", value,
@@ -183,14 +178,13 @@ Resolution resolve(const Method& method, const Spectrum& spectrum, const TaskVec
                    std::uint8_t angular) noexcept {
   const int m = spectrum.rows(), size = spectrum.size();
   Resolution out;
-  out.qdot = JointVector::Zero(spectrum.cols());
   const double enough = kExact * command.norm();
   const Scene scene = survey(method, spectrum);
 
   // Rows that no joint can move at all, of an m×n matrix with m > n.
   for (int i = size; i < m; ++i) {
     out.singular |= static_cast<std::uint8_t>(1u << i);
-    if (std::abs(spectrum.u(i).dot(command)) > enough) out.exact = false;
+    if (std::abs(spectrum.along_u(i, command)) > enough) out.exact = false;
   }
   if (scene.largest < kVanishing) {
     out.singular = static_cast<std::uint8_t>((1u << m) - 1u);
@@ -198,34 +192,53 @@ Resolution resolve(const Method& method, const Spectrum& spectrum, const TaskVec
     return out;
   }
 
-  TaskVector amplified = command;  // Kẋ
-  const auto* jparse = std::get_if<JParse>(&method);
-  if (jparse != nullptr) {
-    for (int row = 0; row < m; ++row) {
-      amplified[row] *= (angular >> row & 1u) != 0 ? jparse->gain_angular : jparse->gain_linear;
-    }
-  }
-  const auto* selective = std::get_if<SelectivelyDampedLeastSquares>(&method);
-
-  for (int i = 0; i < size; ++i) {
-    const double sigma = spectrum.sigma(i);
-    const Direction direction = std::visit(At{sigma, scene}, method);
-    const double part = spectrum.u(i).dot(command);
-    double asked = part;
-    if (direction.gain_weight > 0.0) {
-      asked += direction.gain_weight * (spectrum.u(i).dot(amplified) - part);
-    }
-    JointVector joint = (direction.inverse * asked) * spectrum.v(i);
-    bool clamped = false;
-    if (selective != nullptr && direction.regular) {
-      clamped = clamp_speed(joint, selective_bound(spectrum, i, selective->max_speed));
-    }
-    out.qdot += joint;
-    out.projector[static_cast<std::size_t>(i)] = direction.projector;
-    if (!direction.regular || clamped) out.singular |= static_cast<std::uint8_t>(1u << i);
-    if (clamped || std::abs(sigma * direction.inverse * asked - part) > enough) out.exact = false;
-  }
-  if (selective != nullptr && clamp_speed(out.qdot, selective->max_speed)) out.exact = false;
+  std::visit(
+      [&](const auto& rule) {
+        using Rule = std::decay_t<decltype(rule)>;
+        constexpr bool kSelective = std::is_same_v<Rule, SelectivelyDampedLeastSquares>;
+        TaskVector amplified;  // Kẋ
+        if constexpr (std::is_same_v<Rule, JParse>) {
+          amplified = command;
+          for (int row = 0; row < m; ++row) {
+            amplified[row] *= (angular >> row & 1u) != 0 ? rule.gain_angular : rule.gain_linear;
+          }
+        }
+        for (int i = 0; i < size; ++i) {
+          const double sigma = spectrum.sigma(i);
+          const Direction direction = At{sigma, scene}(rule);
+          const double part = spectrum.along_u(i, command);
+          double asked = part;
+          if constexpr (std::is_same_v<Rule, JParse>) {
+            if (direction.gain_weight > 0.0) {
+              asked += direction.gain_weight * (spectrum.along_u(i, amplified) - part);
+            }
+          }
+          double speed = direction.inverse * asked;
+          bool regular = direction.regular;
+          if constexpr (kSelective) {
+            if (regular) {
+              const double largest = std::abs(speed) * spectrum.v(i).cwiseAbs().maxCoeff();
+              const double bound = selective_bound(spectrum, i, rule.max_speed);
+              if (largest > bound) {
+                speed *= bound / largest;
+                regular = false;
+              }
+            }
+          }
+          out.speed[static_cast<std::size_t>(i)] = speed;
+          out.projector[static_cast<std::size_t>(i)] = direction.projector;
+          if (!regular) out.singular |= static_cast<std::uint8_t>(1u << i);
+          if (std::abs(sigma * speed - part) > enough) out.exact = false;
+        }
+        if constexpr (kSelective) {
+          const double largest = spectrum.combine_v(out.speed).cwiseAbs().maxCoeff();
+          if (largest > rule.max_speed) {
+            for (double& speed : out.speed) speed *= rule.max_speed / largest;
+            out.exact = false;
+          }
+        }
+      },
+      method);
   return out;
 }
 

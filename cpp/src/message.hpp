@@ -1,6 +1,7 @@
 #pragma once
 // Texts of errors, made while setting up.
 
+#include <locale>
 #include <sstream>
 #include <string>
 
@@ -11,6 +12,7 @@ namespace sigmaik::detail {
 template <typename... Parts>
 std::string message(const Parts&... parts) {
   std::ostringstream text;
+  text.imbue(std::locale::classic());
   text.precision(17);
   (text << ... << parts);
   return text.str();

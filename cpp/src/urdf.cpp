@@ -448,8 +448,11 @@ std::string reduced(const XMLElement& robot, const std::vector<const TreeJoint*>
 
 // ---- The arm -------------------------------------------------------------------------------------------------------
 
+// Gazebo writes ±1e16 for "no limit", others the largest double.
+double none_if_huge(double limit) { return std::abs(limit) >= 1e9 ? std::copysign(kInfinity, limit) : limit; }
+
 // Exporters write 0 where they know no limit; a joint that must not move is a fixed joint.
-double none_if_zero(double limit) { return limit == 0.0 ? kInfinity : limit; }
+double none_if_zero(double limit) { return limit == 0.0 ? kInfinity : none_if_huge(limit); }
 
 void read_limits(const TreeJoint& from, const urdf::Joint& joint, Segment& segment) {
   const XMLElement* const limit = from.element->FirstChildElement("limit");
@@ -457,11 +460,11 @@ void read_limits(const TreeJoint& from, const urdf::Joint& joint, Segment& segme
   segment.velocity = none_if_zero(joint.limits->velocity);
   segment.effort = none_if_zero(joint.limits->effort);
   if (limit->Attribute("acceleration") != nullptr) {
-    segment.acceleration = number(from.label(), *limit, "acceleration");
+    segment.acceleration = none_if_huge(number(from.label(), *limit, "acceleration"));
   }
   if (segment.type == JointType::Continuous) return;
-  segment.lower = joint.limits->lower;
-  segment.upper = joint.limits->upper;
+  segment.lower = none_if_huge(joint.limits->lower);
+  segment.upper = none_if_huge(joint.limits->upper);
   // By URDF's default the joint would be stuck at 0.
   require(limit->Attribute("lower") != nullptr || limit->Attribute("upper") != nullptr, from.label(),
           ": <limit> gives neither lower nor upper; a joint that turns without end is of type continuous");

@@ -49,14 +49,7 @@ Solution VelocitySolver::solve(const TaskJacobianRef& jacobian, const TaskRef& t
     return refuse(jacobian);
   }
 
-  // The task's rows, and which of them are angular.
-  TaskJacobian rows = jacobian;
-  TaskVector command = twist;
-  if (select) {
-    rows = select_rows(task_, rotation, Jacobian(jacobian));
-    command = select_rows(task_, rotation, Twist(twist));
-  }
-  std::uint8_t angular = 0;
+  std::uint8_t angular = 0;  // bit i: row i of the task is angular
   if (asked == 6) {
     angular = 0b111000;
   } else {
@@ -67,30 +60,39 @@ Solution VelocitySolver::solve(const TaskJacobianRef& jacobian, const TaskRef& t
       ++row;
     }
   }
-  if (length_scale_ != 1.0) {
+  TaskVector command = twist;
+  if (select || length_scale_ != 1.0) {
+    TaskJacobian rows = jacobian;
+    if (select) {
+      rows = select_rows(task_, rotation, Jacobian(jacobian));
+      command = select_rows(task_, rotation, Twist(twist));
+    }
     for (int row = 0; row < rows.rows(); ++row) {
       if ((angular >> row & 1u) == 0) continue;
       rows.row(row) *= length_scale_;
       command[row] *= length_scale_;
     }
+    spectrum_.decompose(rows);
+  } else {
+    spectrum_.decompose(jacobian);
   }
-
-  spectrum_.decompose(rows);
-  const Resolution resolution = sigmaik::resolve(method_, spectrum_, command, angular);
+  Resolution resolution = sigmaik::resolve(method_, spectrum_, command, angular);
 
   Solution s;
-  s.qdot = resolution.qdot;
   bool exact = resolution.exact;
   if (posture.size() != 0) {
     const double enough = 1e-9 * spectrum_.sigma(0) * posture.norm();
-    s.qdot += posture;
-    for (int i = 0; i < spectrum_.size(); ++i) {
-      const auto v = spectrum_.v(i);
-      const double along = v.dot(posture), projector = resolution.projector[static_cast<std::size_t>(i)];
-      s.qdot -= (projector * along) * v;
+    for (std::size_t i = 0; i < static_cast<std::size_t>(spectrum_.size()); ++i) {
+      const double along = spectrum_.along_v(static_cast<int>(i), posture);
+      resolution.speed[i] -= resolution.projector[i] * along;
       // Where the projector lets some of the posture through, it moves the tip.
-      if (std::abs(spectrum_.sigma(i) * (1.0 - projector) * along) > enough) exact = false;
+      if (std::abs(spectrum_.sigma(static_cast<int>(i)) * (1.0 - resolution.projector[i]) * along) > enough) {
+        exact = false;
+      }
     }
+    s.qdot = posture + spectrum_.combine_v(resolution.speed);
+  } else {
+    s.qdot = spectrum_.combine_v(resolution.speed);
   }
   if (!s.qdot.allFinite()) return refuse(jacobian);  // the command is too large for numbers
 
@@ -98,9 +100,9 @@ Solution VelocitySolver::solve(const TaskJacobianRef& jacobian, const TaskRef& t
   s.singular = resolution.singular;
   s.singular_values.resize(spectrum_.size());
   for (int i = 0; i < spectrum_.size(); ++i) s.singular_values[i] = spectrum_.sigma(i);
-  s.directions.resize(rows.rows(), rows.rows());
+  s.directions.resize(spectrum_.rows(), spectrum_.rows());
   for (int i = 0; i < spectrum_.rows(); ++i) s.directions.col(i) = spectrum_.u(i);
-  s.achieved_twist.noalias() = jacobian * s.qdot;
+  s.achieved_twist = jacobian.lazyProduct(s.qdot);
   return s;
 }
 

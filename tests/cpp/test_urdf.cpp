@@ -2,6 +2,8 @@
 
 #include <doctest/doctest.h>
 
+#include <algorithm>
+#include <array>
 #include <clocale>
 #include <cmath>
 #include <cstdio>
@@ -10,7 +12,6 @@
 #include <limits>
 #include <locale>
 #include <random>
-#include <sstream>
 #include <thread>
 
 #include <console_bridge/console.h>
@@ -312,6 +313,18 @@ TEST_CASE("limits that contradict themselves or are not there") {
   check_facts(refusal(arm(kLimit + kLimit)), {"'j2'", "second <limit>"});
 }
 
+TEST_CASE("huge limits are none") {
+  const Chain chain = Chain::from_urdf(
+      arm("<limit lower='-1e16' upper='1.7976931348623157e308' velocity='1e9' effort='9.9e8' acceleration='1e16'/>"));
+  CHECK(chain.limits().lower[1] == -kInfinity);
+  CHECK(chain.limits().upper[1] == kInfinity);
+  CHECK(chain.limits().velocity[1] == kInfinity);
+  CHECK(chain.limits().effort[1] == 9.9e8);
+  CHECK(chain.limits().acceleration[1] == kInfinity);
+  check_facts(refusal(arm("<limit lower='1e16' upper='1e17' velocity='1' effort='1'/>")), {"'j2'", "lower"});
+  check_facts(refusal(arm("<limit lower='-1' upper='1' velocity='-1e16' effort='1'/>")), {"'j2'", "velocity"});
+}
+
 TEST_CASE("the acceleration argument") {
   const std::string text = arm("<limit lower='-1' upper='1' velocity='1' effort='1' acceleration='9'/>");
   CHECK(Chain::from_urdf(text).limits().acceleration[0] == kInfinity);
@@ -418,6 +431,37 @@ TEST_CASE("origins are exact") {
   }
   MESSAGE("largest error of an entry: ", worst);
   CHECK(worst < 5e-16);
+}
+
+TEST_CASE("damaged files are read or refused, nothing else") {
+  const std::string whole =
+      robot(link("base") + link("a", "<inertial><mass value='1'/><inertia ixx='1' ixy='0' ixz='0' iyy='1' iyz='0' "
+                                     "izz='1'/></inertial>") +
+            link("tip") + joint("j1", "revolute", "base", "a", "<origin xyz='0 0 1' rpy='1 2 3'/>" + kLimit) +
+            joint("j2", "continuous", "a", "tip", "<axis xyz='0 1 0'/>"));
+  std::mt19937_64 random(99);
+  int read = 0, refused = 0;
+  for (int i = 0; i < 5000; ++i) {
+    std::string text = whole;
+    for (auto k = random() % 2 + 1; k > 0; --k) {
+      const std::size_t at = random() % text.size(), length = random() % 12;
+      switch (random() % 4) {
+        case 0: text[at] = static_cast<char>(random() % 256); break;
+        case 1: text.erase(at, length); break;
+        case 2: text.insert(at, text.substr(random() % text.size(), length)); break;
+        default: text[at] = "<>/='0-e&;%"[random() % 11];
+      }
+    }
+    try {
+      const Chain chain = Chain::from_urdf(text[0] == '<' ? text : "<" + text);
+      ++read;
+      CHECK(sigmaik::pose(chain, sigmaik::JointVector::Constant(chain.dof(), 0.5)).matrix().allFinite());
+    } catch (const sigmaik::Error&) {
+      ++refused;
+    }
+  }
+  CHECK(read > 100);
+  CHECK(refused > 100);
 }
 
 class Comma : public std::numpunct<char> {

@@ -107,8 +107,8 @@ void validate(const Method& method);
 
 /// What a rule made of a command.
 struct Resolution {
-  JointVector qdot;                       ///< Σ g_i v_i (n,)
-  std::array<double, kMaxTask> projector{};  ///< p_i of the posture, i < size()
+  std::array<double, kMaxTask> speed{};      ///< g_i: q̇ = Σ g_i v_i; 0 beyond size()
+  std::array<double, kMaxTask> projector{};  ///< p_i of the posture; 0 beyond size()
   std::uint8_t singular = 0;  ///< bit i: the rule does not treat direction u_i as regular
   bool exact = true;          ///< every direction that the command uses is done in full
 };

@@ -27,13 +27,13 @@ struct ServoOptions {
   /// [s] ≥ 0: over this time after reset() a pose target's command is faded in. Twists are faded in only where reset()
   /// was told that the arm moves.
   double soft_start = 0.1;
-  JointVector posture;         ///< (n,) nominal positions; empty: the positions given to reset()
+  JointVector posture{};       ///< (n,) nominal positions; empty: the positions given to reset()
   double posture_gain = 0.0;   ///< [1/s] ≥ 0
   double posture_max_speed = std::numeric_limits<double>::infinity();  ///< [rad/s or m/s] > 0, a joint
   bool velocity_limits = true;  ///< hold the chain's velocity limits
   OnLimit on_limit = OnLimit::Scale;
   double length_scale = 1.0;    ///< [m], see VelocitySolver
-  Task task;                    ///< rows that matter
+  Task task{};                  ///< rows that matter
 };
 
 /// Answer of a cycle. By value, no heap.

@@ -33,6 +33,12 @@ class Spectrum {
   auto u(int i) const noexcept { return u_.col(i).head(m_); }
   /// v_i (n,), i < size(): orthonormal directions of the joints.
   auto v(int i) const noexcept { return v_.col(i).head(n_); }
+  /// u_iᵀ x for x (m,).
+  double along_u(int i, const TaskVector& x) const noexcept { return u(i).dot(x); }
+  /// v_iᵀ x for x (n,).
+  double along_v(int i, const JointVector& x) const noexcept { return v(i).dot(x); }
+  /// Σ x_i v_i (n,), over i < size().
+  JointVector combine_v(const std::array<double, kMaxTask>& x) const noexcept;
   /// Sweeps that the last call took.
   int sweeps() const noexcept { return sweeps_; }
 
@@ -44,7 +50,8 @@ class Spectrum {
   std::uint32_t cycle_ = 0;  // since the start
   std::array<double, kMaxTask> sigma_{};
   // Entries beyond m and n stay zero: sums over them change nothing.
-  Eigen::Matrix<double, kMaxTask, kMaxTask> u_ = Eigen::Matrix<double, kMaxTask, kMaxTask>::Zero();
+  static constexpr int kPaddedTask = 8;
+  Eigen::Matrix<double, kPaddedTask, kMaxTask> u_ = Eigen::Matrix<double, kPaddedTask, kMaxTask>::Zero();
   Eigen::Matrix<double, kMaxJoints, kMaxTask> v_ = Eigen::Matrix<double, kMaxJoints, kMaxTask>::Zero();
 };
 

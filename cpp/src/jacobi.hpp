@@ -1,0 +1,264 @@
+#pragma once
+// The kernel under the singular value decomposition: one-sided Jacobi on a few short columns, written in the
+// compiler's vector types so that it needs to guess nothing. `lanes` is the width of a vector: two in every x86-64,
+// four where the processor has AVX2, which is asked at run time.
+
+#include <cstddef>
+#include <limits>
+#include <type_traits>
+
+namespace sigmaik::detail {
+
+#define SIGMAIK_INLINE inline __attribute__((always_inline))
+
+template <int lanes>
+struct VectorOf;
+template <>
+struct VectorOf<2> {
+  using type = double __attribute__((vector_size(16)));
+};
+template <>
+struct VectorOf<4> {
+  using type = double __attribute__((vector_size(32)));
+};
+template <int lanes>
+using Vector = typename VectorOf<lanes>::type;
+
+// k columns of `length` entries to make orthogonal, and k of eight that are rotated with them.
+template <int length>
+struct alignas(32) JacobiWork {
+  double w[6][length];
+  double r[6][8];
+  double square[6];  // |w_i|²
+};
+
+template <int lanes>
+SIGMAIK_INLINE Vector<lanes> splat(double x) {
+  Vector<lanes> v;
+#pragma GCC unroll 4
+  for (int i = 0; i < lanes; ++i) v[i] = x;
+  return v;
+}
+
+SIGMAIK_INLINE double sum(Vector<2> x) { return x[0] + x[1]; }
+SIGMAIK_INLINE double sum(Vector<4> x) { return (x[0] + x[2]) + (x[1] + x[3]); }
+
+// One column, as vectors.
+template <int lanes, int length>
+struct Column {
+  Vector<lanes> at[length / lanes];
+
+  static SIGMAIK_INLINE Column load(const double (&x)[length]) {
+    Column c;
+#pragma GCC unroll 8
+    for (int i = 0; i < length / lanes; ++i) __builtin_memcpy(&c.at[i], x + i * lanes, sizeof c.at[i]);
+    return c;
+  }
+  SIGMAIK_INLINE void store(double (&x)[length]) const {
+#pragma GCC unroll 8
+    for (int i = 0; i < length / lanes; ++i) __builtin_memcpy(x + i * lanes, &at[i], sizeof at[i]);
+  }
+};
+
+template <int lanes, int length>
+SIGMAIK_INLINE double dot(const double (&x)[length], const double (&y)[length]) {
+  const auto a = Column<lanes, length>::load(x), b = Column<lanes, length>::load(y);
+  Vector<lanes> s = a.at[0] * b.at[0];
+#pragma GCC unroll 8
+  for (int i = 1; i < length / lanes; ++i) s += a.at[i] * b.at[i];
+  return sum(s);
+}
+
+template <int lanes, int length>
+SIGMAIK_INLINE void rotate(double (&x)[length], double (&y)[length], double cosine, double sine) {
+  auto a = Column<lanes, length>::load(x), b = Column<lanes, length>::load(y);
+  const auto c = splat<lanes>(cosine), s = splat<lanes>(sine);
+#pragma GCC unroll 8
+  for (int i = 0; i < length / lanes; ++i) {
+    const auto ai = a.at[i], bi = b.at[i];
+    a.at[i] = c * ai - s * bi;
+    b.at[i] = s * ai + c * bi;
+  }
+  a.store(x);
+  b.store(y);
+}
+
+SIGMAIK_INLINE double larger(double a, double b) { return a > b ? a : b; }
+
+// Round robin: every round pairs all columns once, and the pairs of a round are independent of each other.
+template <int k>
+struct Rounds;
+// clang-format off
+template <> struct Rounds<1> { static constexpr int count = 0, width = 1; static constexpr int pairs[1][1][2] = {{{0,0}}}; };
+template <> struct Rounds<2> { static constexpr int count = 1, width = 1; static constexpr int pairs[1][1][2] = {{{0,1}}}; };
+template <> struct Rounds<3> { static constexpr int count = 3, width = 1; static constexpr int pairs[3][1][2] = {
+    {{0,1}}, {{0,2}}, {{1,2}}}; };
+template <> struct Rounds<4> { static constexpr int count = 3, width = 2; static constexpr int pairs[3][2][2] = {
+    {{0,1},{2,3}}, {{0,2},{1,3}}, {{0,3},{1,2}}}; };
+template <> struct Rounds<5> { static constexpr int count = 5, width = 2; static constexpr int pairs[5][2][2] = {
+    {{0,1},{2,4}}, {{0,3},{1,2}}, {{3,4},{0,2}}, {{1,4},{2,3}}, {{0,4},{1,3}}}; };
+template <> struct Rounds<6> { static constexpr int count = 5, width = 3; static constexpr int pairs[5][3][2] = {
+    {{0,1},{2,5},{3,4}}, {{0,5},{1,4},{2,3}}, {{0,4},{3,5},{1,2}}, {{0,3},{2,4},{1,5}}, {{0,2},{1,3},{4,5}}}; };
+// clang-format on
+
+template <int k, int lanes, int length>
+SIGMAIK_INLINE double measure(JacobiWork<length>& work) {
+  double peak = 0.0;
+#pragma GCC unroll 6
+  for (int i = 0; i < k; ++i) {
+    work.square[i] = dot<lanes>(work.w[i], work.w[i]);
+    peak = larger(peak, work.square[i]);
+  }
+  return peak;
+}
+
+// A last sweep for columns that are all but orthogonal: every angle at once, to first order, which is to rounding where
+// all are below 1e-8. Without the chain of angles it costs a fraction of a full one. False, with nothing done, where
+// an angle is larger.
+template <int k, int lanes, int length>
+SIGMAIK_INLINE bool polish(JacobiWork<length>& work) {
+  using Order = Rounds<k>;
+  double angle[Order::count > 0 ? Order::count : 1][Order::width];
+  double worst = 0.0;
+#pragma GCC unroll 5
+  for (int round = 0; round < Order::count; ++round) {
+#pragma GCC unroll 3
+    for (int j = 0; j < Order::width; ++j) {
+      const int p = Order::pairs[round][j][0], q = Order::pairs[round][j][1];
+      const double c = dot<lanes>(work.w[p], work.w[q]);
+      // Columns that are orthogonal need no rotation, be their lengths equal or both zero.
+      angle[round][j] = c == 0.0 ? 0.0 : c / (work.square[q] - work.square[p]);
+      worst = larger(worst, __builtin_fabs(angle[round][j]));
+    }
+  }
+  if (!(worst <= 1e-8)) return false;
+#pragma GCC unroll 5
+  for (int round = 0; round < Order::count; ++round) {
+#pragma GCC unroll 3
+    for (int j = 0; j < Order::width; ++j) {
+      const int p = Order::pairs[round][j][0], q = Order::pairs[round][j][1];
+      rotate<lanes>(work.w[p], work.w[q], 1.0, angle[round][j]);
+      rotate<lanes>(work.r[p], work.r[q], 1.0, angle[round][j]);
+    }
+  }
+  return true;
+}
+
+// Rotates pairs of columns of w, and of r with them, until all are orthogonal; leaves their squares. Returns the
+// sweeps, or 0 with nothing done where squares or their squares would overflow or vanish.
+template <int k, int lanes, int length>
+SIGMAIK_INLINE int orthogonalise(JacobiWork<length>& work, int max_sweeps) {
+  using Order = Rounds<k>;
+  constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
+  double left = 1.0;  // bound on the cosines that the last sweep has left
+  int sweep = 1;
+  for (; sweep <= max_sweeps; ++sweep) {
+    double* const square = work.square;
+    const double peak = measure<k, lanes>(work);
+    if (!(peak > 1e-100 && peak < 1e100)) return 0;
+    if (left < 1e-9 && polish<k, lanes>(work)) break;
+    // A column shorter than rounding of the longest has nothing in it to make orthogonal.
+    const double floor = peak * peak * (kEpsilon * kEpsilon);
+    double worst_cosine = 0.0, worst_tangent = 0.0;  // the cosine is squared
+#pragma GCC unroll 5
+    for (int round = 0; round < Order::count; ++round) {
+      double c[Order::width], d[Order::width], t[Order::width], cosine[Order::width], ratio = 0.0;
+#pragma GCC unroll 3
+      for (int j = 0; j < Order::width; ++j) {
+        const int p = Order::pairs[round][j][0], q = Order::pairs[round][j][1];
+        c[j] = dot<lanes>(work.w[p], work.w[q]);
+        d[j] = square[q] - square[p];
+        worst_cosine = larger(worst_cosine, c[j] * c[j] / (square[p] * square[q] + floor));
+        t[j] = c[j] / (d[j] + __builtin_copysign(1e-300, d[j]));
+        ratio = larger(ratio, __builtin_fabs(t[j]));
+      }
+      if (ratio < 2e-3) {  // small angles, the rule of a warm start: series, exact to rounding, for the square roots
+#pragma GCC unroll 3
+        for (int j = 0; j < Order::width; ++j) {
+          t[j] -= t[j] * t[j] * t[j];
+          const double tt = t[j] * t[j];
+          cosine[j] = 1.0 - tt * (0.5 - 0.375 * tt);
+        }
+      } else {
+#pragma GCC unroll 3
+        for (int j = 0; j < Order::width; ++j) {
+          const double denominator = __builtin_fabs(d[j]) + __builtin_sqrt(d[j] * d[j] + 4.0 * c[j] * c[j]) + 1e-300;
+          t[j] = __builtin_copysign(2.0, d[j]) * c[j] / denominator;  // tan of the smaller angle
+          cosine[j] = 1.0 / __builtin_sqrt(1.0 + t[j] * t[j]);
+        }
+      }
+#pragma GCC unroll 3
+      for (int j = 0; j < Order::width; ++j) {
+        const int p = Order::pairs[round][j][0], q = Order::pairs[round][j][1];
+        rotate<lanes>(work.w[p], work.w[q], cosine[j], cosine[j] * t[j]);
+        rotate<lanes>(work.r[p], work.r[q], cosine[j], cosine[j] * t[j]);
+        square[p] -= t[j] * c[j];
+        square[q] += t[j] * c[j];
+        worst_tangent = larger(worst_tangent, __builtin_fabs(t[j]));
+      }
+    }
+    // What a sweep leaves behind is of second order: an inner product that was zeroed early meets the rotations that
+    // come later, and becomes at most (cosine of the one) × (cosine, or tangent, of the other).
+    worst_cosine = __builtin_sqrt(worst_cosine);
+    left = worst_cosine * larger(worst_cosine, worst_tangent);
+    if (left <= kEpsilon) break;
+  }
+  measure<k, lanes>(work);
+  return sweep;
+}
+
+// `lanes` entries of a strided vector of `count` from `from` on, zero beyond.
+template <int lanes>
+SIGMAIK_INLINE Vector<lanes> gather(const double* x, std::ptrdiff_t stride, int from, int count, double factor) {
+  Vector<lanes> out = splat<lanes>(0.0);
+  x += from * stride;
+  if (from + lanes <= count) {
+#pragma GCC unroll 4
+    for (int i = 0; i < lanes; ++i) out[i] = x[i * stride];
+  } else {
+#pragma GCC unroll 4
+    for (int i = 0; i < lanes; ++i) {
+      if (from + i < count) out[i] = x[i * stride];
+    }
+  }
+  return factor * out;
+}
+
+// w ← factor · A r for the k columns of A, which have `count` entries: A(j, i) = a[j·inner + i·outer].
+template <int k, int lanes, int length>
+SIGMAIK_INLINE void multiply(JacobiWork<length>& work, const double* a, std::ptrdiff_t inner, std::ptrdiff_t outer,
+                             int count, double factor) {
+#pragma GCC unroll 8
+  for (int b = 0; b < length / lanes; ++b) {
+    Vector<lanes> block[k];
+#pragma GCC unroll 6
+    for (int j = 0; j < k; ++j) block[j] = gather<lanes>(a + j * outer, inner, b * lanes, count, factor);
+#pragma GCC unroll 6
+    for (int i = 0; i < k; ++i) {
+      Vector<lanes> s = work.r[i][0] * block[0];
+#pragma GCC unroll 6
+      for (int j = 1; j < k; ++j) s += work.r[i][j] * block[j];
+      __builtin_memcpy(work.w[i] + b * lanes, &s, sizeof s);
+    }
+  }
+}
+
+template <int lanes, int length>
+SIGMAIK_INLINE int jacobi(JacobiWork<length>& work, int k, const double* a, std::ptrdiff_t inner, std::ptrdiff_t outer,
+                          int count, double factor, int max_sweeps) {
+  const auto run = [&](auto columns) __attribute__((always_inline)) {
+    constexpr int kColumns = decltype(columns)::value;
+    multiply<kColumns, lanes>(work, a, inner, outer, count, factor);
+    return orthogonalise<kColumns, lanes>(work, max_sweeps);
+  };
+  switch (k) {
+    case 1: return run(std::integral_constant<int, 1>{});
+    case 2: return run(std::integral_constant<int, 2>{});
+    case 3: return run(std::integral_constant<int, 3>{});
+    case 4: return run(std::integral_constant<int, 4>{});
+    case 5: return run(std::integral_constant<int, 5>{});
+    default: return run(std::integral_constant<int, 6>{});
+  }
+}
+
+}  // namespace sigmaik::detail

@@ -1,0 +1,43 @@
+"""Closed-loop experiments: an arm, a path, a method, and what comes out.
+
+    from sigmaik import experiments as ex
+
+    experiment = ex.load("ufactory_xarm7", "extended-line")
+    runs = [ex.run(experiment, ex.parse_method(name)) for name in ("jparse", "dls:damping=0.1")]
+    for row in ex.summarize(runs[0]):
+        print(row.waypoint, row.position_error)
+
+The paths and settings are those of the J-PARSE paper (Guptasarma et al.) for the xArm7, the Gen3 and the PUMA 560,
+see `paths` and `settings`. `sigmaik reach` is the same on the command line. Units: m, rad, s.
+"""
+
+from .methods import ALL_METHODS, SHORT_NAMES, NamedMethod, parse_method, parse_methods, singular_gain_sweep
+from .paths import Line, Path, Segment, names, read_waypoints
+from .reach import Experiment, Run, load, run
+from .settings import Settings, published
+from .storage import save_run, save_summary
+from .summary import Summary, summarize
+
+__all__ = [
+    "ALL_METHODS",
+    "SHORT_NAMES",
+    "Experiment",
+    "Line",
+    "NamedMethod",
+    "Path",
+    "Run",
+    "Segment",
+    "Settings",
+    "Summary",
+    "load",
+    "names",
+    "parse_method",
+    "parse_methods",
+    "published",
+    "read_waypoints",
+    "run",
+    "save_run",
+    "save_summary",
+    "singular_gain_sweep",
+    "summarize",
+]

@@ -1,0 +1,227 @@
+"""The closed loop: a servo driven along a path, and what it did, sample by sample."""
+
+from __future__ import annotations
+
+import math
+import pathlib
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+import sigmaik as sk
+
+from . import paths
+from .methods import NamedMethod
+from .settings import Settings, published
+
+__all__ = ["Experiment", "Run", "load", "load_arm", "run"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """An arm, a path and the servo's settings: everything but the method."""
+
+    robot: str  #: name of the shipped arm, or of the URDF file
+    chain: sk.Chain
+    path: paths.Path
+    settings: Settings
+    start: Array  #: (n,) [rad or m]
+    posture: Array  #: q_nominal (n,) [rad or m]
+
+    @property
+    def samples(self) -> int:
+        """Number of control cycles."""
+        return sum(self.cycles(segment) for segment in self.path.segments)
+
+    def cycles(self, segment: paths.Segment) -> int:
+        """Number of control cycles in a segment, at least one."""
+        return max(1, round(segment.duration * self.settings.rate))
+
+
+@dataclass(frozen=True)
+class Run:
+    """What a method did. Sample k is the state at time t[k], and the command from there to the next sample."""
+
+    experiment: Experiment
+    method: NamedMethod
+    velocity_limits: bool  #: whether the arm's joint speed limits were held
+    t: Array  #: (N,) [s]
+    segment: NDArray[np.int32]  #: (N,) index into experiment.path.segments
+    q: Array  #: (N, n) [rad or m]
+    qdot: Array  #: (N, n) commanded [rad/s or m/s]
+    target: Array  #: (N, 3) position of the target [m]
+    pose_error: Array  #: (N, 6) target minus tip [m, rad], base axes
+    singular_values: Array  #: (N, min(6, n)), largest first
+    status: NDArray[np.int8]  #: (N,) sigmaik.Status
+    scale: Array  #: (N,) what the speed limits left of the command, 1 is all
+
+    @property
+    def position_error(self) -> Array:
+        """(N,) [m], the paper's equation 65."""
+        norm: Array = np.linalg.norm(self.pose_error[:, :3], axis=1)
+        return norm
+
+    @property
+    def orientation_error(self) -> Array:
+        """(N,) [rad], angle of the rotation that is left, the paper's equation 66."""
+        norm: Array = np.linalg.norm(self.pose_error[:, 3:], axis=1)
+        return norm
+
+    @property
+    def tip(self) -> Array:
+        """(N, 3) position of the tip [m]."""
+        return self.target - self.pose_error[:, :3]
+
+    @property
+    def inverse_condition(self) -> Array:
+        """(N,) σ_min/σ_max."""
+        s = self.singular_values
+        return np.divide(s[:, -1], s[:, 0], out=np.zeros(len(s)), where=s[:, 0] > 0.0)
+
+    @property
+    def joint_speed(self) -> Array:
+        """(N,) the largest |q̇| of all joints [rad/s, or m/s]."""
+        largest: Array = np.max(np.abs(self.qdot), axis=1)
+        return largest
+
+    @property
+    def deviation(self) -> Array | None:
+        """(N,) distance from the path's line [m]; None where it has none."""
+        line = self.experiment.path.line
+        return None if line is None else line.deviation(self.tip)
+
+
+def load_arm(robot: str, base: str | None = None, tip: str | None = None) -> tuple[str, sk.Chain, Array]:
+    """Name, chain and home (n,) of a shipped arm, or of a URDF file.
+
+    Home of a URDF file is the middle of its joint ranges, or where that is singular the best conditioned of 32
+    random configurations (of fixed seeds). ValueError where there is no such arm, or no such file.
+    """
+    if robot in sk.robots.names():
+        if base is None and tip is None:
+            return robot, sk.robots.load(robot), sk.robots.home(robot)
+        source, label = sk.robots.path(robot), robot
+    else:
+        source = pathlib.Path(robot)
+        label = source.stem
+        if not source.is_file():
+            shipped = ", ".join(sk.robots.names())
+            raise ValueError(f"no shipped arm and no URDF file '{robot}'; shipped are {shipped}")
+    chain = sk.Chain.from_urdf(str(source), base=base, tip=tip)
+    return label, chain, _middle(chain)
+
+
+def load(
+    robot: str,
+    path: str | pathlib.Path | paths.Path,
+    settings: Settings | None = None,
+    base: str | None = None,
+    tip: str | None = None,
+) -> Experiment:
+    """An experiment by the names of its parts.
+
+    robot: a shipped arm, or a URDF file
+    path: a name from `names(robot)`, a file of waypoints (CSV or JSON, see `read_waypoints`), or a Path
+    settings: by default the published ones of the arm; the path's own start and posture go before them
+    base, tip: link names; by default the URDF's root, and its only leaf
+    ValueError where a part is unknown, or of the wrong size for the arm.
+    """
+    label, chain, home = load_arm(robot, base, tip)
+    if not isinstance(path, paths.Path):
+        if pathlib.Path(path).suffix.lower() in (".csv", ".json") or pathlib.Path(path).is_file():
+            path = paths.read_waypoints(path)
+        else:
+            path = paths.named(str(path), label, chain, home)
+    if settings is None:
+        settings = published(label).with_(start=path.start, posture=path.posture)
+    for name in ("rate", "gain_linear", "gain_angular", "max_position_error", "max_orientation_error"):
+        value = getattr(settings, name)
+        if not 0.0 < value < math.inf:
+            raise ValueError(f"{name} must be positive and finite, not {value:g}")
+    start = _sized("start", settings.start, home, chain)
+    posture = _sized("posture", settings.posture, start, chain)
+    return Experiment(label, chain, path, settings, start, posture)
+
+
+def run(
+    experiment: Experiment,
+    method: NamedMethod,
+    velocity_limits: bool = False,
+    progress: Callable[[int], None] | None = None,
+) -> Run:
+    """Runs the loop: a kinematic simulation, in which the arm does exactly what it is told for 1/rate (Euler).
+
+    velocity_limits: hold the arm's joint speed limits by slowing all joints together; False is as published
+    progress: called with the number of cycles done since the last call, about ten times a second of simulated time
+    """
+    s = experiment.settings
+    servo = sk.Servo(
+        experiment.chain,
+        method.method,
+        dt=1.0 / s.rate,
+        gain_linear=s.gain_linear,
+        gain_angular=s.gain_angular,
+        max_linear_error=s.max_position_error,
+        max_angular_error=s.max_orientation_error,
+        soft_start=0.0,
+        posture=experiment.posture,
+        posture_gain=s.posture_gain,
+        posture_max_speed=s.posture_max_speed,
+        velocity_limits=velocity_limits,
+        length_scale=s.length_scale,
+    )
+    servo.reset(experiment.start)
+
+    n, dof = experiment.samples, experiment.chain.dof
+    t = np.arange(n) / s.rate
+    index = np.empty(n, dtype=np.int32)
+    q, qdot = np.empty((n, dof)), np.empty((n, dof))
+    target, error = np.empty((n, 3)), np.empty((n, 6))
+    singular_values = np.empty((n, min(6, dof)))
+    status, scale = np.empty(n, dtype=np.int8), np.empty(n)
+
+    stride = max(1, round(s.rate / 10.0))
+    k = 0
+    state = experiment.start
+    for i, segment in enumerate(experiment.path.segments):
+        for j in range(experiment.cycles(segment)):
+            pose = segment.target(j / s.rate) if segment.pose is None else segment.pose
+            step = servo.update(pose)
+            index[k], q[k], target[k] = i, state, pose[:3, 3]
+            state = step.q
+            qdot[k], error[k], scale[k] = step.qdot, step.pose_error, step.scale
+            singular_values[k], status[k] = step.singular_values, int(step.status)
+            k += 1
+            if progress is not None and k % stride == 0:
+                progress(stride)
+    return Run(
+        experiment, method, velocity_limits, t, index, q, qdot, target, error, singular_values, status, scale
+    )
+
+
+def _middle(chain: sk.Chain) -> Array:
+    lower, upper = chain.limits.lower, chain.limits.upper
+    bounded = np.isfinite(lower) & np.isfinite(upper)
+    middle = np.where(bounded, 0.5 * (np.where(bounded, lower, 0.0) + np.where(bounded, upper, 0.0)), 0.0)
+    if _ratio(chain, middle) > 0.02:
+        return middle
+    return max((chain.random_configuration(seed) for seed in range(32)), key=lambda q: _ratio(chain, q))
+
+
+def _ratio(chain: sk.Chain, q: Array) -> float:
+    s = np.linalg.svd(chain.jacobian(q), compute_uv=False)
+    return float(s[-1] / s[0]) if s[0] > 0.0 else 0.0
+
+
+def _sized(name: str, values: tuple[float, ...] | None, default: Array, chain: sk.Chain) -> Array:
+    if values is None:
+        return default
+    if len(values) != chain.dof:
+        raise ValueError(f"{name} has {len(values)} values, but the arm has {chain.dof} joints")
+    if not all(map(math.isfinite, values)):
+        raise ValueError(f"{name} must be finite")
+    return np.array(values, dtype=np.float64)

@@ -1,0 +1,125 @@
+"""Runs as files, each written whole or not at all.
+
+A run is an npz file with the arrays
+
+    t (N,) [s]   segment (N,)   q (N, n)   qdot (N, n)   target (N, 3) [m]   pose_error (N, 6) [m, rad]
+    singular_values (N, min(6, n))   status (N,)   scale (N,)
+
+as in `Run`, and with robot, path, method, velocity_limits, joint_names, segment_names, velocity (n,) (the arm's speed
+limits), settings (JSON) and version. numpy.load(file) reads it, without pickles. Or it is a CSV file with a line per sample and
+the columns
+
+    t, segment, q_<joint>…, qdot_<joint>…, target_x, target_y, target_z, error_x, error_y, error_z,
+    error_rx, error_ry, error_rz, sigma_1…, status, scale
+"""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import io
+import json
+import os
+import pathlib
+import tempfile
+from collections.abc import Callable, Iterable
+from typing import BinaryIO, Literal
+
+import numpy as np
+
+import sigmaik as sk
+
+from .reach import Run
+from .summary import Summary
+
+__all__ = ["save_run", "save_summary", "write_atomically"]
+
+
+def write_atomically(file: pathlib.Path, write: Callable[[BinaryIO], None]) -> pathlib.Path:
+    """Writes a file beside its place and moves it there, so that nobody ever sees half of it."""
+    file.parent.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(dir=file.parent, prefix=f".{file.name}.")
+    try:
+        with os.fdopen(handle, "wb") as stream:
+            write(stream)
+        umask = os.umask(0)
+        os.umask(umask)
+        os.chmod(name, 0o666 & ~umask)  # mkstemp's files are for their owner only
+        os.replace(name, file)
+    except BaseException:
+        os.unlink(name)
+        raise
+    return file
+
+
+def save_run(run: Run, file: str | pathlib.Path, form: Literal["npz", "csv"] = "npz") -> pathlib.Path:
+    """Time series of a run, see above. Returns the file's path."""
+    return write_atomically(pathlib.Path(file), lambda stream: _WRITERS[form](run, stream))
+
+
+def save_summary(rows: Iterable[Summary], file: str | pathlib.Path) -> pathlib.Path:
+    """Summaries as CSV: a column per field of `Summary`, a line per method and waypoint, SI units."""
+    columns = [field.name for field in dataclasses.fields(Summary)]
+    lines = ([getattr(row, column) for column in columns] for row in rows)
+    return write_atomically(pathlib.Path(file), lambda stream: _write_csv(stream, columns, lines))
+
+
+def _npz(run: Run, stream: BinaryIO) -> None:
+    e = run.experiment
+    np.savez_compressed(
+        stream,
+        t=run.t,
+        segment=run.segment,
+        q=run.q,
+        qdot=run.qdot,
+        target=run.target,
+        pose_error=run.pose_error,
+        singular_values=run.singular_values,
+        status=run.status,
+        scale=run.scale,
+        robot=np.array(e.robot),
+        path=np.array(e.path.name),
+        method=np.array(run.method.label),
+        velocity_limits=np.array(run.velocity_limits),
+        joint_names=np.array(e.chain.joint_names),
+        segment_names=np.array([segment.name for segment in e.path.segments]),
+        velocity=np.array(e.chain.limits.velocity),
+        settings=np.array(json.dumps(dataclasses.asdict(e.settings))),
+        version=np.array(sk.__version__),
+    )
+
+
+def _csv(run: Run, stream: BinaryIO) -> None:
+    names = run.experiment.chain.joint_names
+    columns = ["t", "segment", *(f"q_{name}" for name in names), *(f"qdot_{name}" for name in names)]
+    columns += [f"target_{axis}" for axis in "xyz"]
+    columns += [f"error_{axis}" for axis in ("x", "y", "z", "rx", "ry", "rz")]
+    columns += [f"sigma_{i + 1}" for i in range(run.singular_values.shape[1])] + ["status", "scale"]
+    rows = (
+        [t, segment, *q, *qdot, *target, *error, *sigma, status, scale]
+        for t, segment, q, qdot, target, error, sigma, status, scale in zip(
+            run.t.tolist(),
+            run.segment.tolist(),
+            run.q.tolist(),
+            run.qdot.tolist(),
+            run.target.tolist(),
+            run.pose_error.tolist(),
+            run.singular_values.tolist(),
+            run.status.tolist(),
+            run.scale.tolist(),
+            strict=True,
+        )
+    )
+    _write_csv(stream, columns, rows)
+
+
+_WRITERS: dict[str, Callable[[Run, BinaryIO], None]] = {"npz": _npz, "csv": _csv}
+
+
+def _write_csv(stream: BinaryIO, columns: list[str], rows: Iterable[list[object]]) -> None:
+    text = io.TextIOWrapper(stream, encoding="utf-8", newline="")
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows(rows)
+    text.flush()
+    text.detach()

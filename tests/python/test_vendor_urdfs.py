@@ -1,0 +1,243 @@
+"""Other people's URDFs, as the PyPI packages example-robot-data and rtb-data ship them.
+
+Every path from the root to a leaf, in every file, against a reader and kinematics of the test's own; some
+arms also against Pinocchio, where it is installed.
+"""
+
+import functools
+import importlib.metadata
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import sigmaik as sk
+
+TOLERANCE = 1e-12  # m, and entries of rotations
+SEED = 11
+
+
+def vendor_files():
+    """{short name: path} of every URDF in the packages."""
+    found = {}
+    for package in ("example-robot-data", "rtb-data"):
+        for file in importlib.metadata.distribution(package).files:
+            if file.suffix == ".urdf":
+                found["/".join((package, file.parts[-3], file.name))] = Path(file.locate())
+    return found
+
+
+FILES = vendor_files()
+
+# name, tip (the base is the root), movable joints
+ARMS = [
+    ("example-robot-data/panda_description/panda.urdf", "panda_hand_tcp", 7),
+    ("example-robot-data/ur_description/ur3_robot.urdf", "tool0", 6),
+    ("example-robot-data/ur_description/ur5_robot.urdf", "ee_link", 6),
+    ("example-robot-data/ur_description/ur10_robot.urdf", "tool0", 6),
+    ("example-robot-data/kinova_description/kinova.urdf", "j2s6s200_end_effector", 6),
+    ("example-robot-data/xarm_description/xarm7.urdf", "link7", 7),
+    ("example-robot-data/z1_description/z1.urdf", "gripperStator", 6),
+    ("example-robot-data/so_arm_description/so101.urdf", "gripper_frame_link", 5),
+    ("example-robot-data/baxter_description/baxter.urdf", "left_gripper", 7),
+    ("example-robot-data/pr2_description/pr2.urdf", "r_gripper_palm_link", 8),
+    ("example-robot-data/tiago_description/tiago.urdf", "arm_7_link", 8),
+    ("example-robot-data/talos_data/talos_left_arm.urdf", "gripper_left_motor_double_link", 7),
+    ("rtb-data/kuka_kr210/kr210l150.urdf", "tool0", 6),
+    ("rtb-data/kuka_lbr_iiwa/lbr_iiwa_14_r820.urdf", "tool0", 7),
+    ("rtb-data/abb_irb140_description/irb140.urdf", "tool0", 6),
+    ("rtb-data/unimation_puma560_description/puma560_robot.urdf", "link7", 6),
+    ("rtb-data/lynxmotion_al5d_description/al5d_robot.urdf", "link4", 4),
+]
+IDS = [name.rsplit("/")[-1] for name, _, _ in ARMS]
+
+
+# A reader of its own ----------
+
+
+@functools.cache
+def read(path):
+    """(links in order, {child: joint element}) of a URDF; None where it is not XML."""
+    try:
+        robot = ET.parse(path).getroot()
+    except ET.ParseError:
+        return None
+    links = [link.get("name") for link in robot.findall("link")]
+    return links, {joint.find("child").get("link"): joint for joint in robot.findall("joint")}
+
+
+def path_to(joints, tip):
+    path = []
+    while tip in joints:
+        path.append(joints[tip])
+        tip = joints[tip].find("parent").get("link")
+    return path[::-1]
+
+
+def leaves(links, joints):
+    parents = {joint.find("parent").get("link") for joint in joints.values()}
+    return [link for link in links if link not in parents]
+
+
+def movable(path):
+    return [joint for joint in path if joint.get("type") != "fixed"]
+
+
+def is_arm(path):
+    """Whether sigmaik should take it."""
+    for joint in movable(path):
+        limit = joint.find("limit")
+        if joint.get("type") in ("floating", "planar") or joint.find("mimic") is not None:
+            return False
+        if joint.get("type") != "continuous" and (
+            limit is None or float(limit.get("lower", 0)) >= float(limit.get("upper", 0))
+        ):
+            return False
+    return 1 <= len(movable(path)) <= 16
+
+
+def vector(element, attribute, default):
+    text = default if element is None else element.get(attribute, default)
+    return np.array([float(x) for x in text.split()])
+
+
+def turn(axis, angle):
+    """Rodrigues."""
+    x, y, z = axis
+    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.eye(3) + np.sin(angle) * K + (1.0 - np.cos(angle)) * K @ K
+
+
+def reference(path, q):
+    """Pose (4, 4) and Jacobian (6, n) of the tip."""
+    X, Y, Z = np.eye(3)
+    R, p = np.eye(3), np.zeros(3)
+    axes = []
+    q = iter(q)
+    for joint in path:
+        origin = joint.find("origin")
+        roll, pitch, yaw = vector(origin, "rpy", "0 0 0")
+        p = p + R @ vector(origin, "xyz", "0 0 0")
+        R = R @ turn(Z, yaw) @ turn(Y, pitch) @ turn(X, roll)
+        if joint.get("type") == "fixed":
+            continue
+        axis = vector(joint.find("axis"), "xyz", "1 0 0")
+        axis /= np.linalg.norm(axis)
+        if joint.get("type") == "prismatic":
+            axes.append((None, R @ axis))
+            p = p + next(q) * R @ axis
+        else:
+            axes.append((p, R @ axis))
+            R = R @ turn(axis, next(q))
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = R, p
+    columns = [
+        np.r_[z, np.zeros(3)] if point is None else np.r_[np.cross(z, p - point), z] for point, z in axes
+    ]
+    return pose, np.array(columns).T
+
+
+def limits(path):
+    """(lower, upper, velocity, effort), with sigmaik's reading of what is not given."""
+    rows = []
+    for joint in movable(path):
+        limit = joint.find("limit")
+        get = {} if limit is None else limit.attrib
+        low, high = (float(get.get(name, 0)) for name in ("lower", "upper"))
+        if joint.get("type") == "continuous":
+            low, high = -np.inf, np.inf
+        rows.append([low, high, *(float(get.get(name, 0)) or np.inf for name in ("velocity", "effort"))])
+    rows = np.array(rows).T
+    return np.where(np.abs(rows) >= 1e9, np.copysign(np.inf, rows), rows)
+
+
+# Tests ----------
+
+
+@pytest.mark.parametrize("name", sorted(FILES))
+def test_every_path(name):
+    path = FILES[name]
+    if read(path) is None:
+        with pytest.raises(sk.Error, match="malformed XML"):
+            sk.Chain.from_urdf(path)
+        return
+    rng = np.random.default_rng(SEED)
+    links, joints = read(path)
+    text = path.read_text(encoding="utf-8")
+    for leaf in leaves(links, joints):
+        arm = path_to(joints, leaf)
+        if not is_arm(arm):
+            with pytest.raises(sk.Error):
+                sk.Chain.from_urdf(text, tip=leaf)
+            continue
+        chain = sk.Chain.from_urdf(text, tip=leaf)
+        assert list(chain.joint_names) == [joint.get("name") for joint in movable(arm)]
+        assert list(chain.joint_types) == [joint.get("type") for joint in movable(arm)]
+        assert (chain.base, chain.tip) == (arm[0].find("parent").get("link"), leaf)
+        got = chain.limits
+        np.testing.assert_array_equal([got.lower, got.upper, got.velocity, got.effort], limits(arm))
+        for _ in range(3):
+            q = rng.uniform(-3.0, 3.0, chain.dof)
+            pose, jacobian = reference(arm, q)
+            np.testing.assert_allclose(chain.pose(q), pose, rtol=0, atol=TOLERANCE)
+            np.testing.assert_allclose(chain.jacobian(q), jacobian, rtol=0, atol=TOLERANCE)
+
+
+def test_most_paths_are_arms():
+    """The test above could refuse its way through: count what it compares."""
+    paths = [path_to(file[1], leaf) for file in map(read, FILES.values()) if file for leaf in leaves(*file)]
+    assert sum(map(is_arm, paths)) > 500
+
+
+@pytest.mark.parametrize(("name", "tip", "dof"), ARMS, ids=IDS)
+def test_arm(name, tip, dof):
+    chain = sk.Chain.from_urdf(FILES[name], tip=tip)
+    assert chain.dof == dof
+    arm = path_to(read(FILES[name])[1], tip)
+    rng = np.random.default_rng(SEED)
+    for _ in range(100):
+        q = rng.uniform(-3.0, 3.0, dof)
+        pose, jacobian = reference(arm, q)
+        np.testing.assert_allclose(chain.pose(q), pose, rtol=0, atol=TOLERANCE)
+        np.testing.assert_allclose(chain.jacobian(q), jacobian, rtol=0, atol=TOLERANCE)
+
+
+@pytest.mark.parametrize(("name", "tip", "dof"), ARMS, ids=IDS)
+def test_base_in_the_middle(name, tip, dof):
+    joints = read(FILES[name])[1]
+    arm = path_to(joints, tip)
+    base = movable(arm)[dof // 2].find("parent").get("link")
+    upper = arm[[joint.find("parent").get("link") for joint in arm].index(base) :]
+    chain = sk.Chain.from_urdf(FILES[name], base, tip)
+    assert chain.dof == dof - dof // 2
+    q = np.random.default_rng(SEED).uniform(-3.0, 3.0, chain.dof)
+    pose, jacobian = reference(upper, q)
+    np.testing.assert_allclose(chain.pose(q), pose, rtol=0, atol=TOLERANCE)
+    np.testing.assert_allclose(chain.jacobian(q), jacobian, rtol=0, atol=TOLERANCE)
+
+
+@pytest.mark.parametrize(("name", "tip", "dof"), ARMS, ids=IDS)
+def test_arm_as_in_pinocchio(name, tip, dof):
+    pin = pytest.importorskip("pinocchio")
+    chain = sk.Chain.from_urdf(FILES[name], tip=tip)
+    model = pin.buildModelFromUrdf(str(FILES[name]))
+    data = model.createData()
+    ids = [model.getJointId(joint) for joint in chain.joint_names]
+    rng = np.random.default_rng(SEED)
+    for _ in range(20):
+        q = rng.uniform(-3.0, 3.0, dof)
+        full = pin.neutral(model)
+        for value, i in zip(q, ids, strict=True):
+            # Continuous joints are (cos, sin) there.
+            full[model.idx_qs[i] : model.idx_qs[i] + model.nqs[i]] = (
+                value if model.nqs[i] == 1 else (np.cos(value), np.sin(value))
+            )
+        frame = model.getFrameId(tip, pin.FrameType.BODY)
+        pin.computeJointJacobians(model, data, full)
+        pin.updateFramePlacements(model, data)
+        jacobian = pin.getFrameJacobian(model, data, frame, pin.LOCAL_WORLD_ALIGNED)
+        np.testing.assert_allclose(chain.pose(q), data.oMf[frame].homogeneous, rtol=0, atol=TOLERANCE)
+        np.testing.assert_allclose(
+            chain.jacobian(q), jacobian[:, [model.idx_vs[i] for i in ids]], rtol=0, atol=TOLERANCE
+        )
