@@ -25,8 +25,10 @@ test: build .venv/.test .venv/.package  ## everything: install, stubs, types, C+
 	ctest --test-dir build/release --output-on-failure
 	$(BIN)/python -m pytest
 
-bench: build  ## C++ benchmarks, also as build/bench.json
-	build/release/sigmaik_bench --benchmark_out=build/bench.json --benchmark_out_format=json
+bench: .venv/.bench .venv/.package build/release/build.ninja  ## all benchmarks and the peers: one table, build/bench/bench.json
+	cmake build/release  # finds the solvers that .venv has
+	cmake --build build/release
+	$(BIN)/python bench/report.py
 
 wheel: .venv/.build  ## a wheel that carries its libraries, in dist/, checked in an empty environment
 	tools/build_wheel.sh
@@ -55,8 +57,8 @@ build/release/build.ninja: CMakePresets.json | system
 .venv/pyvenv.cfg: | system
 	$(PYTHON) -m venv .venv
 
-# .build, .demo and .test: the packages that building, the demo and the tests need.
-.venv/.build .venv/.demo .venv/.test: .venv/.%: .venv/pyvenv.cfg pyproject.toml tools/requirements.py
+# .build, .demo, .test, .bench: the packages that building, the demo, the tests and the benchmarks need.
+.venv/.build .venv/.demo .venv/.test .venv/.bench: .venv/.%: .venv/pyvenv.cfg pyproject.toml tools/requirements.py
 	$(BIN)/python -m pip install -q $$($(BIN)/python tools/requirements.py $*)
 	@touch $@
 

@@ -1,8 +1,4 @@
 // Every kernel beside its peers, in one binary: ratios of one run mean something on a noisy machine.
-#include <array>
-#include <cstdlib>
-#include <random>
-#include <string>
 #include <vector>
 
 #include <Eigen/SVD>
@@ -14,46 +10,15 @@
 #include <kdl/chainjnttojacsolver.hpp>
 
 #include <sigmaik/kdl.hpp>
-#include <sigmaik/sigmaik.hpp>
+
+#include "scene.hpp"
 
 namespace {
 
-using sigmaik::Chain;
-using sigmaik::JointVector;
-
-constexpr int kPath = 1024;  // a power of two, so that going round costs nothing
-
-// Seven joints at 1 kHz: a smooth motion at speeds of about 1 rad/s, there and back.
-struct Scene {
-  Chain arm = Chain::from_urdf(std::string(SIGMAIK_ROBOTS_DIR) + "/ufactory_xarm7.urdf");
-  std::vector<JointVector> q;
-  std::vector<sigmaik::Jacobian> jacobian;
-  std::vector<Eigen::Matrix<double, 6, 7>> random;
-  sigmaik::Twist twist;
-
-  Scene() {
-    sigmaik::ChainState state;
-    JointVector home(7);
-    home << 0.0, -0.35, 0.2, 1.05, 0.1, 1.4, 0.0;
-    for (int i = 0; i < kPath; ++i) {
-      const double phase = 2.0 * M_PI * i / kPath;
-      JointVector now = home;
-      for (int j = 0; j < 7; ++j) now[j] += 0.16 * std::sin(phase + j);
-      update(arm, now, state);
-      q.push_back(now);
-      jacobian.push_back(state.jacobian);
-    }
-    std::mt19937_64 generator(1);
-    std::normal_distribution<double> normal;
-    for (int i = 0; i < kPath; ++i) random.push_back(Eigen::Matrix<double, 6, 7>::NullaryExpr([&] { return normal(generator); }));
-    twist << 0.1, -0.05, 0.2, 0.1, 0.3, -0.2;
-  }
-};
-
-const Scene& scene() {
-  static const Scene instance;
-  return instance;
-}
+using bench::kPath;
+using bench::Scene;
+using bench::scene;
+using bench::JointVector;
 
 // Kinematics ---------------------------------------------------------------------------------------------------------
 
@@ -167,13 +132,10 @@ BENCHMARK(solve_sigmaik)->DenseRange(0, 7);
 
 void servo_pose_sigmaik(benchmark::State& state) {
   const Scene& s = scene();
-  sigmaik::Servo servo(s.arm, sigmaik::JParse{}, {.posture = s.q[0], .posture_gain = 1.0});
-  servo.reset(s.q[0]);
-  std::vector<sigmaik::Pose> target;
-  for (const JointVector& q : s.q) target.push_back(pose(s.arm, q));
+  sigmaik::Servo servo = s.servo();
   int i = 0;
   for (auto _ : state) {
-    const sigmaik::ServoStep step = servo.update(target[i++ & (kPath - 1)]);
+    const sigmaik::ServoStep step = servo.update(s.pose[i++ & (kPath - 1)]);
     benchmark::DoNotOptimize(step.qdot.data());
     benchmark::ClobberMemory();
   }
@@ -215,27 +177,6 @@ void velocity_kdl_pinv_givens(benchmark::State& state) {
   kdl_velocity(state, solver);
 }
 BENCHMARK(velocity_kdl_pinv_givens);
-
-// Batch --------------------------------------------------------------------------------------------------------------
-
-void solve_batch_sigmaik(benchmark::State& state) {
-  const Scene& s = scene();
-  constexpr std::size_t kCount = 16 * kPath;
-  std::vector<double> jacobian, twist(kCount * 6, 0.1), qdot(kCount * 7);
-  for (std::size_t b = 0; b < kCount; ++b) {
-    const auto& j = s.random[b & (kPath - 1)];
-    for (int row = 0; row < 6; ++row) {
-      for (int column = 0; column < 7; ++column) jacobian.push_back(j(row, column));
-    }
-  }
-  for (auto _ : state) {
-    sigmaik::solve_batch(sigmaik::JParse{}, 1.0, {kCount, 6, 7}, jacobian.data(), twist.data(), qdot.data(), nullptr,
-                         static_cast<int>(state.range(0)));
-    benchmark::ClobberMemory();
-  }
-  state.SetItemsProcessed(static_cast<std::int64_t>(state.iterations() * kCount));
-}
-BENCHMARK(solve_batch_sigmaik)->Arg(1)->Arg(2)->UseRealTime();
 
 }  // namespace
 

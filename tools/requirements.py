@@ -13,7 +13,7 @@ else:
 def requirements(what: str) -> list[str]:
     config = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text(encoding="utf-8"))
     if what == "build":
-        return config["build-system"]["requires"]
+        return config["build-system"]["requires"] + config["project"]["dependencies"]
     project = config["project"]
 
     def resolve(extra: str) -> list[str]:

@@ -6,12 +6,11 @@ out=build/stubs
 rm -rf "$out"
 .venv/bin/python -m pybind11_stubgen sigmaik._core --output-dir "$out" --exit-code
 
-# What pybind11-stubgen does not know: how a stub spells the members of an enum, that Enum has types for its own
-# methods, and that CMakeLists.txt is the only place with the version.
+# What pybind11-stubgen does not know: how a stub spells the members of an enum, that an enum's methods are Enum's (and
+# differ from one Python to the next), and that CMakeLists.txt is the only place with the version.
 sed -zEi '
   s/\n    ([A-Z_]+): typing\.ClassVar\[\w+\]/\n    \1 = .../g
-  s/\n    @classmethod\n    def __new__\(cls, value\):\n        \.\.\.//g
-  s/\n    def __format__\(self, format_spec\):\n        \.\.\.//g
+  s/(\n    [A-Z_]+ = \.\.\.\n)((    @\w+\n)*    def [^\n]*\n(        [^\n]*\n)+)+/\1/g
   s/\n__version__: str = [^\n]*/\n__version__: str/
   s/ +\n/\n/g' "$out/sigmaik/_core.pyi"
 

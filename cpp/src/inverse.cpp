@@ -14,7 +14,7 @@ using detail::require;
 
 // A relative σ that is zero but for rounding: for rules that must not divide by it and have no threshold of their own.
 constexpr double kRankTolerance = 1e-12;
-// Part of the command's norm that a direction may lose before the answer counts as damped.
+// Part of the command that a direction may lose before the answer counts as damped.
 constexpr double kExact = 1e-9;
 // A Jacobian this small moves nothing; its inverse would only overflow.
 constexpr double kVanishing = 1e-100;
@@ -178,7 +178,7 @@ Resolution resolve(const Method& method, const Spectrum& spectrum, const TaskVec
                    std::uint8_t angular) noexcept {
   const int m = spectrum.rows(), size = spectrum.size();
   Resolution out;
-  const double enough = kExact * command.norm();
+  const double enough = kExact * command.cwiseAbs().maxCoeff();  // a norm's squares overflow and vanish
   const Scene scene = survey(method, spectrum);
 
   // Rows that no joint can move at all, of an m×n matrix with m > n.

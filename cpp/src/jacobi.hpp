@@ -101,6 +101,18 @@ template <> struct Rounds<6> { static constexpr int count = 5, width = 3; static
     {{0,1},{2,5},{3,4}}, {{0,5},{1,4},{2,3}}, {{0,4},{3,5},{1,2}}, {{0,3},{2,4},{1,5}}, {{0,2},{1,3},{4,5}}}; };
 // clang-format on
 
+// Columns shorter than this part of the longest are mostly rounding: nothing in them is to be made orthogonal.
+constexpr double kNoise = 16.0 * std::numeric_limits<double>::epsilon();
+// Columns with a cosine up to this are orthogonal but for rounding. Turning them further would stir, every cycle, the
+// directions of singular values that are equal.
+constexpr double kOrthogonal = 16.0 * std::numeric_limits<double>::epsilon();
+
+// The inner product c of columns of squares a and b, or 0 where they are to be left as they are.
+SIGMAIK_INLINE double to_turn(double a, double b, double c, double noise) {
+  const bool rest = c * c <= kOrthogonal * kOrthogonal * (a * b) || (a < b ? a : b) <= noise;
+  return rest ? 0.0 : c;
+}
+
 template <int k, int lanes, int length>
 SIGMAIK_INLINE double measure(JacobiWork<length>& work) {
   double peak = 0.0;
@@ -116,7 +128,7 @@ SIGMAIK_INLINE double measure(JacobiWork<length>& work) {
 // all are below 1e-8. Without the chain of angles it costs a fraction of a full one. False, with nothing done, where
 // an angle is larger.
 template <int k, int lanes, int length>
-SIGMAIK_INLINE bool polish(JacobiWork<length>& work) {
+SIGMAIK_INLINE bool polish(JacobiWork<length>& work, double noise) {
   using Order = Rounds<k>;
   double angle[Order::count > 0 ? Order::count : 1][Order::width];
   double worst = 0.0;
@@ -125,9 +137,9 @@ SIGMAIK_INLINE bool polish(JacobiWork<length>& work) {
 #pragma GCC unroll 3
     for (int j = 0; j < Order::width; ++j) {
       const int p = Order::pairs[round][j][0], q = Order::pairs[round][j][1];
-      const double c = dot<lanes>(work.w[p], work.w[q]);
-      // Columns that are orthogonal need no rotation, be their lengths equal or both zero.
-      angle[round][j] = c == 0.0 ? 0.0 : c / (work.square[q] - work.square[p]);
+      const double a = work.square[p], b = work.square[q];
+      const double c = to_turn(a, b, dot<lanes>(work.w[p], work.w[q]), noise);
+      angle[round][j] = c == 0.0 ? 0.0 : c / (b - a);
       worst = larger(worst, __builtin_fabs(angle[round][j]));
     }
   }
@@ -156,9 +168,9 @@ SIGMAIK_INLINE int orthogonalise(JacobiWork<length>& work, int max_sweeps) {
     double* const square = work.square;
     const double peak = measure<k, lanes>(work);
     if (!(peak > 1e-100 && peak < 1e100)) return 0;
-    if (left < 1e-9 && polish<k, lanes>(work)) break;
-    // A column shorter than rounding of the longest has nothing in it to make orthogonal.
-    const double floor = peak * peak * (kEpsilon * kEpsilon);
+    const double noise = peak * (kNoise * kNoise);
+    if (left < 1e-9 && polish<k, lanes>(work, noise)) break;
+    const double floor = peak * noise;  // keeps columns of noise out of the cosines
     double worst_cosine = 0.0, worst_tangent = 0.0;  // the cosine is squared
 #pragma GCC unroll 5
     for (int round = 0; round < Order::count; ++round) {
@@ -166,7 +178,7 @@ SIGMAIK_INLINE int orthogonalise(JacobiWork<length>& work, int max_sweeps) {
 #pragma GCC unroll 3
       for (int j = 0; j < Order::width; ++j) {
         const int p = Order::pairs[round][j][0], q = Order::pairs[round][j][1];
-        c[j] = dot<lanes>(work.w[p], work.w[q]);
+        c[j] = to_turn(square[p], square[q], dot<lanes>(work.w[p], work.w[q]), noise);
         d[j] = square[q] - square[p];
         worst_cosine = larger(worst_cosine, c[j] * c[j] / (square[p] * square[q] + floor));
         t[j] = c[j] / (d[j] + __builtin_copysign(1e-300, d[j]));

@@ -32,7 +32,7 @@ void check_joints(const char* what, const JointVector& values, const Chain& chai
 }
 
 void shorten(Eigen::Ref<Eigen::Vector3d> vector, double longest) noexcept {
-  const double length = vector.norm();
+  const double length = std::hypot(vector[0], vector[1], vector[2]);  // squares of far targets overflow
   if (length > longest) vector *= longest / length;
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 
 #include "jacobi.hpp"
@@ -140,29 +141,34 @@ void Spectrum::decompose_padded(const TaskJacobianRef& jacobian) noexcept {
     }
   }
 
+  // Below this a column is mostly rounding: neither its direction nor its place among its like means anything.
+  double peak = 0.0;
+  for (int i = 0; i < k; ++i) peak = std::max(peak, work.square[i]);
+  const double noise = peak * (detail::kNoise * detail::kNoise);
+
   std::array<int, kMaxTask> order{};
-  for (int i = 0; i < k; ++i) {  // insertion sort, from large to small, stable
+  for (int i = 0; i < k; ++i) {  // insertion sort, from large to small; noise keeps the last cycle's order
     int at = i;
-    for (; at > 0 && work.square[order[static_cast<std::size_t>(at - 1)]] < work.square[i]; --at) {
+    for (; at > 0 && work.square[i] > noise && work.square[order[static_cast<std::size_t>(at - 1)]] < work.square[i];
+         --at) {
       order[static_cast<std::size_t>(at)] = order[static_cast<std::size_t>(at - 1)];
     }
     order[static_cast<std::size_t>(at)] = i;
   }
 
-  // Below this a column is mostly rounding, and its direction means nothing.
-  const double noise = 16.0 * kEpsilon * std::sqrt(work.square[order[0]]);
   unsigned given = 0;
   for (int i = 0; i < k; ++i) {
     const int from = order[static_cast<std::size_t>(i)];
     const double sigma = std::sqrt(work.square[from]);
     sigma_[static_cast<std::size_t>(i)] = sigma / factor;
     std::copy_n(work.r[from], kPaddedTask, rotated + i * rotated_stride);
-    if (sigma <= noise) continue;
+    if (!(work.square[from] > noise)) continue;
     given |= 1u << i;
     const double inverse = 1.0 / sigma;
     const int count = wide ? kPadded : kPaddedTask;
     for (int j = 0; j < count; ++j) divided[i * divided_stride + j] = inverse * work.w[from][j];
   }
+  std::sort(sigma_.begin(), sigma_.begin() + k, std::greater<>{});  // the noise, too
   const int wanted = wide ? k : m_;
   for (int i = 0; i < wanted; ++i) {
     if (given >> i & 1u) continue;

@@ -81,7 +81,7 @@ Solution VelocitySolver::solve(const TaskJacobianRef& jacobian, const TaskRef& t
   Solution s;
   bool exact = resolution.exact;
   if (posture.size() != 0) {
-    const double enough = 1e-9 * spectrum_.sigma(0) * posture.norm();
+    const double enough = 1e-9 * spectrum_.sigma(0) * posture.cwiseAbs().maxCoeff();
     for (std::size_t i = 0; i < static_cast<std::size_t>(spectrum_.size()); ++i) {
       const double along = spectrum_.along_v(static_cast<int>(i), posture);
       resolution.speed[i] -= resolution.projector[i] * along;

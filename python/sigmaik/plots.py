@@ -1,4 +1,4 @@
-"""Figures of experiments, in the style of the J-PARSE paper's. Needs matplotlib, `pip install 'sigmaik[demo]'`.
+"""Figures of experiments, in the style of the J-PARSE paper's. Needs matplotlib, of the extra "demo".
 
 Nothing here needs a display, and pyplot's global state is left alone.
 """
@@ -9,7 +9,7 @@ import io
 import pathlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -27,7 +27,8 @@ __all__ = ["experiment_figure", "save_figure"]
 
 Array = NDArray[np.float64]
 
-# Okabe and Ito's colours, which most colour-blind people can tell apart. J-PARSE is the strong blue everywhere.
+# Okabe and Ito's colours, which most colour-blind people can tell apart. J-PARSE is the strong blue
+# everywhere.
 _COLOURS = {
     "jparse": "#0072B2",
     "pinv": "#D55E00",
@@ -39,15 +40,15 @@ _COLOURS = {
     "safety-projection": "#7A5C3E",
 }
 _DASHES = ("-", (0, (5, 1.5)), (0, (2, 1)), (0, (6, 1, 1, 1)), (0, (1, 1)), (0, (8, 2)))
-_SWEEP = ("#B5D4E9", "#6BAED6", "#2E86C1", "#1B5E9E", "#123A6B", "#081D40")
+_SWEEP = ("#9CC9E8", "#5BA7D6", "#2E86C1", "#1B5E9E", "#123A6B", "#081D40")
 
 
 @dataclass(frozen=True)
 class _Panel:
     label: str
     values: Callable[[Run], Array]
-    floor: float  #: smaller values are drawn here
-    ceiling: float  #: the axis ends here at the latest
+    floor: float  #: where the axis begins
+    ceiling: float  #: where it ends at the latest
 
 
 def _millimetres(run: Run) -> Array:
@@ -64,24 +65,24 @@ def _deviation(run: Run) -> Array:
 
 
 _POSITION = _Panel("position error [mm]", _millimetres, 1e-2, 4e3)
-_ORIENTATION = _Panel("orientation error [°]", _degrees, 1e-3, 300.0)
+_ORIENTATION = _Panel("orientation error [°]", _degrees, 1e-3, 400.0)
 _DEVIATION = _Panel("distance from\nthe line [mm]", _deviation, 1e-2, 4e3)
-_CONDITION = _Panel("σ_min / σ_max", lambda run: run.inverse_condition, 1e-5, 1.0)
-_SPEED = _Panel("largest joint\nspeed [rad/s]", lambda run: run.joint_speed, 1e-4, 1e5)
+_CONDITION = _Panel(r"$\sigma_{min}\,/\,\sigma_{max}$", lambda run: run.inverse_condition, 1e-4, 0.4)
+_SPEED = _Panel("largest joint\nspeed [rad/s]", lambda run: run.joint_speed, 1e-3, 1e5)
 
 
 def experiment_figure(runs: Sequence[Run], title: str | None = None) -> Figure:
     """Position error, orientation error, inverse condition number and joint speed over time, a line per run.
 
-    All runs are of one experiment. Runs without and with the arm's speed limits stand side by side. Where the target moves
-    along a line, the distance from it has a panel of its own. Scales are logarithmic, values below the axis are
-    drawn on its lower end; waypoints are marked, as are γ and the speed limit.
+    All runs are of one experiment. Runs without and with the arm's speed limits stand side by side. Where the
+    target moves along a line, the distance from it has a panel of its own. Scales are logarithmic; waypoints
+    are marked, as are γ and the least and the largest of the joints' speed limits.
     """
     if not runs:
         raise ValueError("no run to draw")
     experiment = runs[0].experiment
     moving = experiment.path.line is not None
-    panels = [_DEVIATION, _ORIENTATION, _CONDITION, _SPEED] if moving else [_POSITION, _ORIENTATION, _CONDITION, _SPEED]
+    panels = [_DEVIATION if moving else _POSITION, _ORIENTATION, _CONDITION, _SPEED]
     columns = sorted({run.velocity_limits for run in runs})
 
     figure = Figure(figsize=(6.4 * len(columns) + 0.6, 2.1 * len(panels) + 1.4), layout="constrained")
@@ -98,13 +99,13 @@ def experiment_figure(runs: Sequence[Run], title: str | None = None) -> Figure:
             for run in sorted(chosen, key=_layer):
                 colour, dash = styles[run.method.label]
                 strong = run.method.family == "jparse"
-                values = np.clip(panel.values(run), panel.floor, panel.ceiling)
+                values = np.maximum(panel.values(run), 1e-3 * panel.floor)  # zero has no logarithm
                 axes.plot(
                     run.t,
                     values,
                     color=colour,
                     linestyle=dash,
-                    linewidth=2.0 if strong else 1.2,
+                    linewidth=1.7 if strong else 1.2,
                     alpha=0.55 if run.method.family == "pinv" else 0.95,
                     label=run.method.label,
                 )
@@ -156,9 +157,8 @@ def _styles(runs: Sequence[Run]) -> dict[str, tuple[str, object]]:
         for i, label in enumerate(variants):
             colour = _COLOURS.get(family, "black")
             dash: object = _DASHES[i % len(_DASHES)]
-            if family == "jparse" and len(variants) > 1:
-                step = (len(_SWEEP) - 1) / (len(variants) - 1)
-                colour, dash = _SWEEP[round(i * step)], "-"
+            if family == "jparse" and len(variants) > 2:
+                colour, dash = _SWEEP[round(i * (len(_SWEEP) - 1) / (len(variants) - 1))], "-"
             styles[label] = (colour, dash)
     return styles
 
@@ -175,16 +175,28 @@ def _decorate(axes: Axes, panel: _Panel, run: Run, first: bool) -> None:
     for segment in experiment.path.segments[:-1]:
         end += segment.duration
         axes.axvline(end, color="0.6", linewidth=0.8, linestyle=(0, (4, 3)), zorder=0)
-    note = {"color": "0.35", "fontsize": 8, "ha": "right", "va": "bottom", "transform": axes.get_yaxis_transform()}
+    note: dict[str, Any] = {
+        "color": "0.35",
+        "fontsize": 8,
+        "ha": "right",
+        "va": "bottom",
+        "transform": axes.get_yaxis_transform(),
+    }
+    top = axes.get_ylim()[1]
     if panel is _CONDITION:
+        top = panel.ceiling
         gamma = experiment.settings.gamma
         axes.axhline(gamma, color="0.35", linewidth=0.8, linestyle=":")
         axes.text(0.995, gamma * 1.1, "γ", **note)
     if panel is _SPEED:
-        limit = experiment.chain.limits.velocity
-        if np.isfinite(limit).all():
-            axes.axhline(float(limit.max()), color="0.35", linewidth=0.8, linestyle=":")
-            axes.text(0.995, float(limit.max()) * 1.1, "arm's limit", **note)
+        speeds = experiment.chain.limits.velocity
+        known = speeds[np.isfinite(speeds)]
+        for limit in np.unique([known.min(), known.max()]) if len(known) else ():
+            axes.axhline(float(limit), color="0.35", linewidth=0.8, linestyle=":")
+        if len(known):
+            axes.text(0.995, float(known.max()) * 1.1, "arm's limits", **note)
+            top = max(top, 4.0 * float(known.max()))
+    axes.set_ylim(panel.floor, min(max(top, 10.0 * panel.floor), panel.ceiling))
 
 
 def _name_waypoints(axes: Axes, run: Run) -> None:

@@ -71,7 +71,7 @@ TEST_CASE("logarithm: every angle about every axis") {
       const Vector3d log = sigmaik::rotation_log(exact_rotation(axis, angle));
       // The nine entries are rounded, so no vector is closer than that.
       CHECK((log - angle * axis).norm() < 4e-15);
-      if (angle <= 1e-9) CHECK((log - angle * axis).norm() < 1e-15 * angle + 1e-320);
+      if (angle <= 1e-9) CHECK((log - angle * axis).cwiseAbs().maxCoeff() < 2e-15 * angle);
     }
   }
 }
@@ -125,7 +125,9 @@ TEST_CASE("logarithm and exponential undo each other") {
     CAPTURE(vector.transpose());
     const Matrix3d r = sigmaik::rotation_exp(vector);
     CHECK((r.transpose() * r - Matrix3d::Identity()).cwiseAbs().maxCoeff() < 4e-15);
-    CHECK((sigmaik::rotation_log(r) - vector).norm() < 1e-14 * std::max(vector.norm(), 1e-6) + 1e-320);
+    const double error = (sigmaik::rotation_log(r) - vector).cwiseAbs().maxCoeff();
+    CHECK(error < 1e-14);
+    if (vector.norm() < 1e-6) CHECK(error < 1e-14 * vector.cwiseAbs().maxCoeff());
     CHECK((r - exact_rotation(vector, static_cast<long double>(vector.norm()))).cwiseAbs().maxCoeff() < 2e-15);
   }
 }
@@ -133,7 +135,7 @@ TEST_CASE("logarithm and exponential undo each other") {
 TEST_CASE("exponential of several turns and of subnormal vectors is a rotation") {
   Random random(6);
   for (int i = 0; i < 1000; ++i) {
-    const Vector3d vector = random.unit(3) * (i % 2 == 0 ? random.uniform(3.0, 100.0) : random.decades(-322.0, -290.0));
+    const Vector3d vector = random.unit(3) * (i % 2 == 0 ? random.decades(0.5, 307.0) : random.decades(-322.0, -290.0));
     CAPTURE(vector.transpose());
     const Matrix3d r = sigmaik::rotation_exp(vector);
     CHECK(r.allFinite());

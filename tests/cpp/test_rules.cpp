@@ -247,7 +247,7 @@ TEST_CASE("exact: says whether J q̇ is the command") {
         CHECK(missed <= 3e-9 * x.norm());
         ++exact;
       } else {
-        CHECK(missed > 0.9e-9 * x.norm());
+        CHECK(missed > 0.3e-9 * x.norm());
         ++inexact;
       }
     }

@@ -216,6 +216,27 @@ TEST_CASE("a warm start gives what a cold one gives, and keeps signs") {
   }
 }
 
+TEST_CASE("a small part that changes wholly while the large part stands still") {
+  Random random(12);
+  for (int repeat = 0; repeat < 200; ++repeat) {
+    const int m = random.integer(4, 6), n = random.integer(m, 12), large = random.integer(1, m - 3);
+    const MatrixXd left = random.orthonormal(m, m), right = random.orthonormal(n, n);
+    const double size = random.decades(-13.0, -1.0);
+    Spectrum s;
+    for (int step = 0; step < 20; ++step) {
+      MatrixXd core = MatrixXd::Zero(m, n);
+      core.topLeftCorner(large, large).setIdentity();
+      core.bottomRightCorner(m - large, n - large) = size * random.matrix(m - large, n - large);
+      const MatrixXd j = left * core * right.transpose();
+      s.decompose(j);
+      CAPTURE(repeat);
+      CAPTURE(size);
+      check_decomposition(s, j);
+      check_values(s, j);
+    }
+  }
+}
+
 TEST_CASE("a hundred thousand cycles leave U and V orthogonal") {
   Random random(5);
   struct Size {

@@ -7,8 +7,8 @@
     for row in ex.summarize(runs[0]):
         print(row.waypoint, row.position_error)
 
-The paths and settings are those of the J-PARSE paper (Guptasarma et al.) for the xArm7, the Gen3 and the PUMA 560,
-see `paths` and `settings`. `sigmaik reach` is the same on the command line. Units: m, rad, s.
+The paths and settings are those of the J-PARSE paper (Guptasarma et al.) for the xArm7, the Gen3 and the PUMA
+560, see `paths` and `settings`. `sigmaik reach` is the same on the command line. Units: m, rad, s.
 """
 
 from .methods import ALL_METHODS, SHORT_NAMES, NamedMethod, parse_method, parse_methods, singular_gain_sweep

@@ -1,4 +1,4 @@
-"""Methods by short name, with parameters: "jparse", "dls:damping=0.8", "jparse:gain_linear=2,continuous=false"."""
+"""Methods by short name, with parameters: "jparse", "dls:damping=0.8", "jparse:gain=2,continuous=false"."""
 
 from __future__ import annotations
 
@@ -110,8 +110,9 @@ ALL_METHODS: tuple[str, ...] = tuple(_FAMILIES)
 def parse_method(spec: str, settings: Settings | None = None) -> NamedMethod:
     """One method from NAME or NAME:parameter=value,parameter=value.
 
-    Parameters that are not given come from the experiment's settings (γ, the gain in singular directions), then from
-    the library. ValueError where a name, a parameter or a value is wrong; it says what there is.
+    Parameters that are not given come from the experiment's settings (γ, the gain in singular directions),
+    then from the library. For jparse, gain=… sets gain_linear and gain_angular. ValueError where a name, a
+    parameter or a value is wrong; it says what there is.
     """
     name, _, arguments = spec.strip().partition(":")
     family = _FAMILIES.get(name)
@@ -120,6 +121,9 @@ def parse_method(spec: str, settings: Settings | None = None) -> NamedMethod:
     values: dict[str, Value] = dict(family.settings(settings or Settings()))
     for item in filter(None, (part.strip() for part in arguments.split(","))):
         key, equals, text = (part.strip() for part in item.partition("="))
+        if key == "gain" and equals and family.make is sk.JParse:
+            values["gain_linear"] = values["gain_angular"] = _value(name, key, text, 1.0)
+            continue
         if key not in family.parameters or not equals:
             known = ", ".join(f"{k}={_show(v)}" for k, v in family.parameters.items())
             raise ValueError(f"method '{name}' has no parameter '{item}'; it has {known}")
@@ -148,8 +152,10 @@ def parse_methods(specs: Iterable[str], settings: Settings | None = None) -> lis
 
 
 def singular_gain_sweep(gains: Iterable[float], gamma: float, continuous: bool = False) -> list[NamedMethod]:
-    """J-PARSE at several gains in singular directions, the same for position and orientation (figures 14 and 15 of
-    the paper). continuous=False is the published rule."""
+    """J-PARSE at several gains in singular directions, as in figures 14 and 15 of the paper.
+
+    Each gain is for position and orientation. continuous=False is the published rule.
+    """
     methods = []
     for gain in gains:
         method = sk.JParse(gamma=gamma, gain_linear=gain, gain_angular=gain, continuous=continuous)
@@ -183,4 +189,6 @@ def _value(name: str, key: str, text: str, default: Value) -> Value:
 
 
 def _show(value: Value) -> str:
-    return str(value).lower() if isinstance(value, bool) else f"{value:g}" if isinstance(value, float) else value
+    return (
+        str(value).lower() if isinstance(value, bool) else f"{value:g}" if isinstance(value, float) else value
+    )

@@ -1,10 +1,11 @@
 """Where the tip is sent: waypoints that are held for a time, and slow sines along a line.
 
-Positions in m and rotations in the base frame; roll, pitch, yaw [rad] turn about the fixed axes x, y, z in that order
-(R = Rz(yaw) Ry(pitch) Rx(roll), as in URDF).
+Positions in m and rotations in the base frame; roll, pitch, yaw [rad] turn about the fixed axes x, y, z in
+that order (R = Rz(yaw) Ry(pitch) Rx(roll), as in URDF).
 
 The figures of the J-PARSE paper's paths come from the paper and from its authors' public code
-(github.com/armlabstanford/jparse), where the text gives them; the others were chosen here and are marked *ours*.
+(github.com/armlabstanford/jparse), where the text gives them; the others were chosen here and are marked
+*ours*.
 """
 
 from __future__ import annotations
@@ -107,7 +108,7 @@ def _waypoints(
     name: str, positions: Sequence[tuple[float, float, float]], rotation: Array, description: str
 ) -> Path:
     segments = tuple(
-        Segment.hold(f"({x:g}, {y:g}, {z:g})", make_pose((x, y, z), rotation), DWELL) for x, y, z in positions
+        Segment.hold(f"({x:g},{y:g},{z:g})", make_pose((x, y, z), rotation), DWELL) for x, y, z in positions
     )
     return Path(name, segments, description)
 
@@ -123,7 +124,7 @@ def _sine_line(
     start: tuple[float, ...] | None = None,
     posture: tuple[float, ...] | None = None,
 ) -> Path:
-    """Target on a line through the centre pose (4, 4): amplitude · cos(2πt/period), so that it starts at rest."""
+    """Target on a line through the centre pose (4, 4): amplitude · cos(2πt/period), which starts at rest."""
     unit = np.asarray(direction, dtype=np.float64)
 
     def target(t: float) -> Array:
@@ -135,7 +136,7 @@ def _sine_line(
     return Path(name, segments, description, Line(centre[:3, 3].copy(), unit), start, posture)
 
 
-# --- xArm7 -----------------------------------------------------------------------------------------------------------
+# --- xArm7
 
 _DOWN = rotation_rpy(math.pi, 0.0, 0.0)
 
@@ -180,7 +181,7 @@ def _xarm7_overhead_line(_: sk.Chain) -> Path:
     )
 
 
-# --- Gen3 ------------------------------------------------------------------------------------------------------------
+# --- Gen3
 
 _FORWARD = rotation_rpy(math.pi / 2.0, 0.0, math.pi / 2.0)
 
@@ -197,9 +198,10 @@ def _gen3_line(_: sk.Chain) -> Path:
 def _gen3_internal(_: sk.Chain) -> Path:
     """Axes 1 and 3 in line (q2 = 0). All figures *ours*.
 
-    The arm loses rank there only where q3 = ±π/2 besides. So joints 1 and 3 of the published posture are turned a quarter
-    against each other; with q2 = 0 it is still the published pose. Axis 2 then swings the arm sideways, through q2 = 0
-    in the middle of the line. x and z are those of such a pose with the elbow at q4 = −2.
+    The arm loses rank there only where q3 = ±π/2 besides. So joints 1 and 3 of the published posture are
+    turned a quarter against each other; with q2 = 0 it is still the published pose. Axis 2 then swings the
+    arm sideways, through q2 = 0 in the middle of the line. x and z are those of such a pose with the elbow at
+    q4 = −2.
     """
     return _sine_line(
         "internal-singularity",
@@ -214,7 +216,7 @@ def _gen3_internal(_: sk.Chain) -> Path:
     )
 
 
-# --- PUMA 560 --------------------------------------------------------------------------------------------------------
+# --- PUMA 560
 
 #: Lengths of the shipped PUMA 560 [m]: upper arm, offset at the elbow, forearm.
 _PUMA_A2, _PUMA_A3, _PUMA_D4 = 0.4318, 0.0203, 0.4318
@@ -243,10 +245,10 @@ def puma_locks() -> Mapping[str, Array]:
 
 
 def _puma_waypoints(chain: sk.Chain) -> Path:
-    """(a) regular, (b) shoulder lock, (c) vertical: shoulder and elbow, (d) horizontal: elbow and wrist, and back to (a).
+    """(a) regular, (b) shoulder lock, (c) vertical: shoulder and elbow, (d) horizontal: elbow and wrist, (a).
 
-    The order is the paper's, the figures *ours*: each target is the pose at such a configuration, so that it can be
-    reached, and the lock is exact. 30 s each: near a target at an elbow lock the error falls as 1/t.
+    The order is the paper's, the figures *ours*: each target is the pose at such a configuration, so that it
+    can be reached, and the lock is exact. 30 s each: near a target at an elbow lock the error falls as 1/t.
     """
     locks = puma_locks()
     order = [*locks, "regular"]
@@ -259,15 +261,15 @@ def _puma_waypoints(chain: sk.Chain) -> Path:
     )
 
 
-#: Wrist lock in the middle of the PUMA's slow line: θ5 = 0, the forearm and the tool 30° below the horizontal.
+#: Wrist lock in the middle of the PUMA's slow line: θ5 = 0, forearm and tool 30° below the horizontal.
 PUMA_WRIST_LOCK = np.radians([0.0, 75.0, -195.0, 90.0, 0.0, -90.0])
 
 
 def _puma_wrist_lock(chain: sk.Chain) -> Path:
     """θ5 = 0 twice a cycle. All figures *ours*.
 
-    x, z and the orientation are those of a configuration at the lock. θ4 = 90° there makes axis 5 stand upright, so that
-    the wrist turns against joint 1 as y moves, and θ5 changes its sign.
+    x, z and the orientation are those of a configuration at the lock. θ4 = 90° puts axis 5 into
+    the arm's upright plane, so that joint 5 turns against joint 1 as y moves, and θ5 changes its sign.
     """
     return _sine_line(
         "wrist-lock",
@@ -281,11 +283,11 @@ def _puma_wrist_lock(chain: sk.Chain) -> Path:
     )
 
 
-# --- any arm ---------------------------------------------------------------------------------------------------------
+# --- any arm
 
 
 def _generic_line(chain: sk.Chain, home: Array) -> Path:
-    """Out of reach, home, and half the way in, all at home's height and orientation. *Ours*, for arms without figures."""
+    """Out of reach, home, and half the way in, at home's height and orientation. *Ours*, for any arm."""
     pose = chain.pose(home)
     position, rotation = pose[:3, 3], pose[:3, :3]
     radius = math.hypot(position[0], position[1])
@@ -338,7 +340,7 @@ def named(name: str, robot: str, chain: sk.Chain, home: Array) -> Path:
     raise ValueError(f"no path '{name}' for '{robot}', and no such file; there are {there_are}")
 
 
-# --- files -----------------------------------------------------------------------------------------------------------
+# --- files
 
 COLUMNS = ("x", "y", "z", "roll", "pitch", "yaw", "duration")
 
@@ -346,10 +348,12 @@ COLUMNS = ("x", "y", "z", "roll", "pitch", "yaw", "duration")
 def read_waypoints(file: str | pathlib.Path) -> Path:
     """Waypoints from a CSV or JSON file.
 
-    CSV: a header line with the columns x, y, z [m], roll, pitch, yaw [rad, fixed axes], duration [s], in any order, and,
+    CSV: a header line with the columns x, y, z [m], roll, pitch, yaw [rad, fixed axes], duration [s], in any
+        order, and,
     if wanted, name; lines that start with # are comments.
 
-    JSON: a list of waypoints, or an object whose "waypoints" is that list. A waypoint is an object with the same seven
+    JSON: a list of waypoints, or an object whose "waypoints" is that list. A waypoint is an object with the
+        same seven
     names (and "name", if wanted), or a list of the seven numbers in that order.
 
     ValueError, with the file, the waypoint and the value, where something is missing or not a number.
@@ -367,7 +371,7 @@ def read_waypoints(file: str | pathlib.Path) -> Path:
         x, y, z, roll, pitch, yaw, duration = numbers
         if duration <= 0.0:
             raise ValueError(f"waypoints '{file}', {where}: duration must be positive, not {duration:g}")
-        name = str(row.get("name") or f"({x:g}, {y:g}, {z:g})")
+        name = str(row.get("name") or f"({x:g},{y:g},{z:g})")
         pose = make_pose((x, y, z), rotation_rpy(roll, pitch, yaw))
         segments.append(Segment.hold(name, pose, duration))
     if not segments:
@@ -382,7 +386,7 @@ def _csv_rows(file: pathlib.Path, text: str) -> list[tuple[str, Mapping[str, obj
     missing = [column for column in COLUMNS if column not in header]
     if missing:
         raise ValueError(
-            f"waypoints '{file}': no column {', '.join(missing)}; the first line must name {', '.join(COLUMNS)}"
+            f"waypoints '{file}': no column {', '.join(missing)}; the first line names {', '.join(COLUMNS)}"
         )
     reader.fieldnames = header
     return [(f"line {reader.line_num}", row) for row in reader]
@@ -395,13 +399,17 @@ def _json_rows(file: pathlib.Path, text: str) -> list[tuple[str, Mapping[str, ob
         raise ValueError(f"waypoints '{file}', line {error.lineno}: {error.msg}") from None
     items = data.get("waypoints") if isinstance(data, dict) else data
     if not isinstance(items, list):
-        raise ValueError(f"waypoints '{file}': a list of waypoints, or an object with the list 'waypoints', is expected")
+        raise ValueError(
+            f"waypoints '{file}': a list of waypoints, or an object with the list 'waypoints', is expected"
+        )
     rows: list[tuple[str, Mapping[str, object]]] = []
     for i, item in enumerate(items):
         where = f"waypoint {i + 1}"
         if isinstance(item, list):
             if len(item) != len(COLUMNS):
-                raise ValueError(f"waypoints '{file}', {where}: {len(item)} numbers; expected {', '.join(COLUMNS)}")
+                raise ValueError(
+                    f"waypoints '{file}', {where}: {len(item)} numbers; expected {', '.join(COLUMNS)}"
+                )
             item = dict(zip(COLUMNS, item, strict=True))
         if not isinstance(item, dict):
             raise ValueError(f"waypoints '{file}', {where}: neither an object nor a list of seven numbers")
@@ -413,7 +421,7 @@ def _number(file: pathlib.Path, where: str, column: str, value: object) -> float
     if value is None or value == "":
         raise ValueError(f"waypoints '{file}', {where}: {column} is missing")
     try:
-        number = float(value) if isinstance(value, str | int | float) and not isinstance(value, bool) else math.nan
+        number = float(value) if isinstance(value, (str, int, float)) else math.nan
     except ValueError:
         number = math.nan
     if not math.isfinite(number):

@@ -44,7 +44,7 @@ class Experiment:
 
 @dataclass(frozen=True)
 class Run:
-    """What a method did. Sample k is the state at time t[k], and the command from there to the next sample."""
+    """What a method did. Sample k is the state at t[k], and the command from there to the next."""
 
     experiment: Experiment
     method: NamedMethod
@@ -98,8 +98,8 @@ class Run:
 def load_arm(robot: str, base: str | None = None, tip: str | None = None) -> tuple[str, sk.Chain, Array]:
     """Name, chain and home (n,) of a shipped arm, or of a URDF file.
 
-    Home of a URDF file is the middle of its joint ranges, or where that is singular the best conditioned of 32
-    random configurations (of fixed seeds). ValueError where there is no such arm, or no such file.
+    Home of a URDF file is the middle of its joint ranges, or where that is singular the best conditioned of
+    32 random configurations (of fixed seeds). ValueError where there is no such arm, or no such file.
     """
     if robot in sk.robots.names():
         if base is None and tip is None:
@@ -121,13 +121,15 @@ def load(
     settings: Settings | None = None,
     base: str | None = None,
     tip: str | None = None,
+    **changes: object,
 ) -> Experiment:
     """An experiment by the names of its parts.
 
     robot: a shipped arm, or a URDF file
     path: a name from `names(robot)`, a file of waypoints (CSV or JSON, see `read_waypoints`), or a Path
-    settings: by default the published ones of the arm; the path's own start and posture go before them
+    settings: by default the published ones of the arm, with the path's own start and posture
     base, tip: link names; by default the URDF's root, and its only leaf
+    changes: settings by name that go before all of these, where they are not None
     ValueError where a part is unknown, or of the wrong size for the arm.
     """
     label, chain, home = load_arm(robot, base, tip)
@@ -138,6 +140,7 @@ def load(
             path = paths.named(str(path), label, chain, home)
     if settings is None:
         settings = published(label).with_(start=path.start, posture=path.posture)
+    settings = settings.with_(**changes)
     for name in ("rate", "gain_linear", "gain_angular", "max_position_error", "max_orientation_error"):
         value = getattr(settings, name)
         if not 0.0 < value < math.inf:
@@ -153,10 +156,11 @@ def run(
     velocity_limits: bool = False,
     progress: Callable[[int], None] | None = None,
 ) -> Run:
-    """Runs the loop: a kinematic simulation, in which the arm does exactly what it is told for 1/rate (Euler).
+    """Runs the loop: a kinematic simulation, in which the arm does what it is told for 1/rate (Euler).
 
     velocity_limits: hold the arm's joint speed limits by slowing all joints together; False is as published
-    progress: called with the number of cycles done since the last call, about ten times a second of simulated time
+    progress: called with the number of cycles done since the last call, about ten times a second of simulated
+        time
     """
     s = experiment.settings
     servo = sk.Servo(

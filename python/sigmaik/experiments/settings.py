@@ -1,7 +1,7 @@
 """Gains, rate and posture of the pose servo, per arm, as the J-PARSE paper's experiments have them.
 
-Figures that the paper does not print come from its authors' public code (github.com/armlabstanford/jparse); those
-chosen here are marked *ours*.
+Figures that the paper does not print come from its authors' public code (github.com/armlabstanford/jparse);
+those chosen here are marked *ours*.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ __all__ = ["Settings", "published"]
 
 @dataclass(frozen=True)
 class Settings:
-    """ẋ = [k_p e_p; k_o e_o], e_p shortened to a cap, and a posture q̇ = k_n (q_nominal − q) in the null space."""
+    """ẋ = [k_p e_p; k_o e_o], e_p shortened to a cap, and a posture q̇ = k_n (q_nominal − q)."""
 
     rate: float = 50.0  #: [Hz] of the loop
     gain_linear: float = 5.0  #: k_p [1/s]
@@ -46,7 +46,8 @@ _PUBLISHED = {
         posture=(0.0,) * 7,
         posture_gain=2.0,
     ),
-    # Gen3, simulated. k_n and the singular gain are those of the authors' main_experiment_kinova.py and its launch file.
+    # Gen3, simulated. k_n and the singular gain are those of the authors' main_experiment_kinova.py and its
+    # launch file.
     "kinova_gen3_7dof": Settings(
         rate=20.0,
         gain_linear=1.0,
@@ -57,11 +58,14 @@ _PUBLISHED = {
         posture=(0.0, 0.26, 3.14, -2.27, 0.0, 0.96, 1.57),
         posture_gain=2.0,
     ),
-    # Rate, gains and cap *ours*: neither the paper nor the code has them. The arm is not redundant: no posture.
-    "puma560": Settings(rate=50.0, gain_linear=5.0, gain_angular=5.0, max_position_error=0.5, singular_gain=1.0),
+    # Rate, gains and cap *ours*: neither the paper nor the code has them. The arm is not redundant: no
+    # posture.
+    "puma560": Settings(
+        rate=50.0, gain_linear=5.0, gain_angular=5.0, max_position_error=0.5, singular_gain=1.0
+    ),
 }
 
 
 def published(robot: str) -> Settings:
-    """Settings of the paper's experiments for a shipped arm; for any other arm the defaults of `Settings` (ours)."""
+    """Settings of the paper's experiments with an arm; for arms that it has not, the defaults (ours)."""
     return _PUBLISHED.get(robot, Settings())

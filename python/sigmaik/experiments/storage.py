@@ -5,9 +5,9 @@ A run is an npz file with the arrays
     t (N,) [s]   segment (N,)   q (N, n)   qdot (N, n)   target (N, 3) [m]   pose_error (N, 6) [m, rad]
     singular_values (N, min(6, n))   status (N,)   scale (N,)
 
-as in `Run`, and with robot, path, method, velocity_limits, joint_names, segment_names, velocity (n,) (the arm's speed
-limits), settings (JSON) and version. numpy.load(file) reads it, without pickles. Or it is a CSV file with a line per sample and
-the columns
+as in `Run`, and with robot, path, method, velocity_limits, joint_names, segment_names, velocity (n,) (the
+arm's speed limits), settings (JSON) and version. numpy.load(file) reads it, without pickles. Or it is a CSV
+file with a line per sample and the columns
 
     t, segment, q_<joint>…, qdot_<joint>…, target_x, target_y, target_z, error_x, error_y, error_z,
     error_rx, error_ry, error_rz, sigma_1…, status, scale

@@ -26,6 +26,7 @@ class Summary:
     position_error: float  #: settled, at the waypoint's end [m]
     orientation_error: float  #: settled, at the waypoint's end [rad]
     max_joint_speed: float  #: largest |q̇| of all joints on the way [rad/s, or m/s]
+    max_speed_ratio: float  #: largest |q̇|/limit of all joints on the way; 0 where the arm has no limits
     min_inverse_condition: float  #: smallest σ_min/σ_max on the way
     settling_time: float  #: [s], see `settling_time`; NaN where the error does not settle
     rest_speed: float  #: largest |q̇| in the waypoint's last second [rad/s, or m/s]
@@ -52,6 +53,7 @@ def summarize(run: Run) -> list[Summary]:
                 position_error=float(position[-1]),
                 orientation_error=float(orientation[-1]),
                 max_joint_speed=float(speed.max()),
+                max_speed_ratio=float((np.abs(run.qdot[here]) / run.experiment.chain.limits.velocity).max()),
                 min_inverse_condition=float(run.inverse_condition[here].min()),
                 settling_time=settling_time(position, orientation, rate),
                 rest_speed=float(speed[-max(1, round(REST * rate)) :].max()),
@@ -65,7 +67,7 @@ def summarize(run: Run) -> list[Summary]:
 
 
 def settling_time(position: NDArray[np.float64], orientation: NDArray[np.float64], rate: float) -> float:
-    """Time [s] after which both errors stay near their last values; NaN where that is only in the last second.
+    """Time [s] after which both errors stay near their last values; NaN where that is in the last second.
 
     Near is 2 % of the largest error on the way, but at least 1 mm and 0.01 rad.
 

@@ -14,9 +14,31 @@ from .summary import Summary
 
 __all__ = ["summary_table"]
 
+_HEADS = (
+    "pos.\nerror\nmm",
+    "ori.\nerror\n°",
+    "sett-\nling\ns",
+    "joint\nspeed\nrad/s",
+    "at\nrest\nrad/s",
+    "least\nσ_min/\nσ_max",
+)
+_MOVING_HEADS = (
+    "off the\nline\nmm",
+    "\nrms\nmm",
+    "behind\ntarget\nmm",
+    "ori.\nerror\n°",
+    "joint\nspeed\nrad/s",
+    "least\nσ_min/\nσ_max",
+)
+
 
 def summary_table(experiment: Experiment, rows: Sequence[Summary], title: str) -> Table:
-    """A line per method and waypoint; 80 characters wide. Joint speeds beyond the arm's limits are red."""
+    """A line per method and waypoint, for 80 characters and more. Speeds beyond the arm's limits are red.
+
+    A waypoint's line has the settled errors, the time to settle, the largest joint speed on the way and in
+    the last second, and the smallest σ_min/σ_max. A cycle's line, where the target moves along a line, has
+    the largest distance from the line and its root mean square, the largest errors, and the last two.
+    """
     moving = experiment.path.line is not None
     table = Table(
         title=title,
@@ -26,20 +48,14 @@ def summary_table(experiment: Experiment, rows: Sequence[Summary], title: str) -
         padding=(0, 1, 0, 0),
         pad_edge=False,
     )
-    table.add_column("method", no_wrap=True)
-    table.add_column("cycle" if moving else "waypoint", no_wrap=True)
-    if moving:
-        heads = ("off the\nline\nmm", "rms\n\nmm", "behind\ntarget\nmm", "orient.\nerror\n°")
-    else:
-        heads = ("pos.\nerror\nmm", "orient.\nerror\n°", "settled\nafter\ns")
-    for head in (*heads, "joint\nspeed\nrad/s", "same,\nat rest\nrad/s", "least\nσ_min/\nσ_max"):
-        if not (moving and "rest" in head):
-            table.add_column(head, justify="right", no_wrap=True)
+    table.add_column("method", overflow="fold")
+    table.add_column("cycle" if moving else "waypoint")
+    heads = _MOVING_HEADS if moving else _HEADS
+    for head in heads:
+        table.add_column(head, justify="right", no_wrap=True)
 
-    limit = float(min(experiment.chain.limits.velocity.max(), math.inf))
-    last = ""
     for i, row in enumerate(rows):
-        speed = Text(_compact(row.max_joint_speed), style="red" if row.max_joint_speed > 1.001 * limit else "")
+        speed = Text(_compact(row.max_joint_speed), style="red" if row.max_speed_ratio > 1.0 + 1e-9 else "")
         if moving:
             cells = [
                 _compact(1e3 * row.max_deviation),
@@ -49,28 +65,35 @@ def summary_table(experiment: Experiment, rows: Sequence[Summary], title: str) -
             ]
         else:
             settled = "–" if math.isnan(row.settling_time) else f"{row.settling_time:.1f}"
-            cells = [_compact(1e3 * row.position_error), _compact(math.degrees(row.orientation_error)), settled]
+            cells = [
+                _compact(1e3 * row.position_error),
+                _compact(math.degrees(row.orientation_error)),
+                settled,
+            ]
         at_rest = [] if moving else [_compact(row.rest_speed)]
         ends = i + 1 == len(rows) or rows[i + 1].method != row.method
-        name = "" if row.method == last else row.method
-        last = row.method
+        begins = i == 0 or rows[i - 1].method != row.method
         table.add_row(
-            name,
+            row.method if begins else "",
             row.waypoint,
             *cells,
             speed,
             *at_rest,
-            f"{row.min_inverse_condition:.4f}",
+            _ratio(row.min_inverse_condition),
             end_section=ends and len(experiment.path.segments) > 1,
         )
     return table
 
 
 def _compact(value: float) -> str:
-    """At most seven characters, two decimals at most."""
+    """At most five characters, two decimals at most."""
     if not math.isfinite(value):
         return "–"
-    for limit, decimals in ((100.0, 2), (1000.0, 1), (1e6, 0)):
+    for limit, decimals in ((9.995, 2), (999.95, 1), (99999.5, 0)):
         if abs(value) < limit:
             return f"{value:.{decimals}f}"
-    return f"{value:.1e}"
+    return f"{value:.0e}"
+
+
+def _ratio(value: float) -> str:
+    return f"{value:.4f}" if value >= 1e-3 or value == 0.0 else f"{value:.0e}"

@@ -1,0 +1,402 @@
+"""The command `sigmaik`: reach (experiments), robots, info.
+
+Everything that is asked of a file or an option and is wrong there ends with one line on stderr and exit code
+2.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib.util
+import math
+import os
+import pathlib
+import sys
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+import sigmaik as sk
+
+from . import experiments as ex
+from .experiments.reach import load_arm
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+__all__ = ["main"]
+
+Array = NDArray[np.float64]
+
+
+class _Missing(Exception):
+    """A package of an extra is not installed."""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Runs the command. Returns the exit code: 0, 2 for wrong input, 130 when interrupted."""
+    arguments = _parser().parse_args(argv)
+    try:
+        result: int = arguments.run(arguments)
+        sys.stdout.flush()
+        return result
+    except (ValueError, OSError, _Missing) as error:
+        if isinstance(error, BrokenPipeError):  # `sigmaik robots | head -1`
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            return 0
+        print(f"sigmaik: {_one_line(error)}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        return 130
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="sigmaik", description="Velocity inverse kinematics at and near singularities."
+    )
+    parser.add_argument("--version", action="version", version=f"sigmaik {sk.__version__}")
+    commands = parser.add_subparsers(metavar="COMMAND", required=True)
+    _add_reach(
+        commands.add_parser("reach", help="drive an arm along a path by one method or several, and compare")
+    )
+    robots = commands.add_parser("robots", help="list the arms that are shipped, and their paths")
+    robots.set_defaults(run=_robots)
+    _add_info(commands.add_parser("info", help="an arm's joints, limits, reach and singular values"))
+    return parser
+
+
+# --- reach
+
+
+def _add_reach(parser: argparse.ArgumentParser) -> None:
+    parser.description = (
+        "Runs the closed loop, prints a table, and writes the time series, the table and a picture. What is "
+        "not given comes from the J-PARSE paper's experiments with that arm. The last line on stdout is the "
+        "picture's path."
+    )
+    parser.epilog = (
+        "methods: "
+        + "; ".join(f"{name} ({title})" for name, title in ex.SHORT_NAMES.items())
+        + ". Parameters follow a colon: dls:damping=0.8, jparse:gain=2,continuous=false. Lists that start "
+        "with a minus need an equals sign: --posture=-0.1,0.2,…"
+    )
+    arm = parser.add_argument_group("the arm and its way")
+    arm.add_argument("--robot", default="ufactory_xarm7", help="a shipped arm or a URDF file (%(default)s)")
+    arm.add_argument("--base", help="base link (the URDF's root)")
+    arm.add_argument("--tip", help="tip link (the URDF's only leaf)")
+    arm.add_argument(
+        "--path",
+        default="extended-line",
+        help="a name from `sigmaik robots`, or a CSV or JSON file of waypoints: x, y, z [m], roll, pitch, "
+        "yaw [rad, fixed axes], duration [s] (%(default)s)",
+    )
+    arm.add_argument(
+        "--start", metavar="Q", help="joint positions to start from: home, zero, or a comma list"
+    )
+    arm.add_argument(
+        "--method",
+        action="append",
+        metavar="NAME[:PARAMETER=VALUE,…]",
+        help="may be repeated; a comma list, or all (all)",
+    )
+    arm.add_argument(
+        "--gains",
+        metavar="LIST",
+        help="compare J-PARSE, as published, at these gains in singular directions: 0.5,1,2,4",
+    )
+    arm.add_argument(
+        "--limits",
+        choices=("on", "off", "both"),
+        default="both",
+        help="hold the arm's joint speed limits, or not, as published, or compare (%(default)s)",
+    )
+    loop = parser.add_argument_group("the loop")
+    for option, unit, text in (
+        ("--rate", "HZ", "control rate"),
+        ("--gain-linear", "1/S", "position error to velocity"),
+        ("--gain-angular", "1/S", "orientation error to angular velocity"),
+        ("--max-position-error", "M", "longer position errors are shortened to it"),
+        ("--max-orientation-error", "RAD", "longer orientation errors are shortened to it"),
+        ("--gamma", "Γ", "threshold of J-PARSE and its ablations on σ_i/σ_max"),
+        ("--singular-gain", "K", "J-PARSE's gain in singular directions"),
+        ("--posture-gain", "1/S", "pull towards the posture"),
+        ("--posture-max-speed", "RAD/S", "cap on each joint's posture speed"),
+        ("--length-scale", "M", "1 rad weighs as much as this length"),
+    ):
+        loop.add_argument(option, type=float, metavar=unit, help=text)
+    loop.add_argument("--posture", metavar="Q", help="nominal joint positions: home, zero, or a comma list")
+    out = parser.add_argument_group("what is written")
+    out.add_argument("--out", default="sigmaik-reach", type=pathlib.Path, metavar="DIR", help="(%(default)s)")
+    out.add_argument(
+        "--format", choices=("npz", "csv", "none"), default="npz", help="of the time series (%(default)s)"
+    )
+    out.add_argument(
+        "--no-plot", action="store_true", help="no picture; the last line is the table's path then"
+    )
+    parser.set_defaults(run=_reach)
+
+
+def _reach(arguments: argparse.Namespace) -> int:
+    console = _console()
+    if not arguments.no_plot:
+        _need("matplotlib")
+    # Parsed before anything runs, so that a wrong option is told at once.
+    changes = {
+        name: getattr(arguments, name)
+        for name in (
+            "rate",
+            "gain_linear",
+            "gain_angular",
+            "max_position_error",
+            "max_orientation_error",
+            "gamma",
+            "singular_gain",
+            "posture_gain",
+            "posture_max_speed",
+            "length_scale",
+        )
+    }
+    for name in ("start", "posture"):
+        text = getattr(arguments, name)
+        if text is not None:
+            _, chain, home = load_arm(arguments.robot, arguments.base, arguments.tip)
+            changes[name] = tuple(_configuration(f"--{name}", text, chain, home))
+    experiment = ex.load(arguments.robot, arguments.path, base=arguments.base, tip=arguments.tip, **changes)
+    methods = _methods(arguments, experiment.settings)
+    runs = _run_all(experiment, methods, _limits(arguments.limits, experiment.chain))
+
+    from .experiments.table import summary_table
+
+    console.print(_headline(experiment), highlight=False)
+    rows = [row for run in runs for row in ex.summarize(run)]
+    for limits in sorted({run.velocity_limits for run in runs}):
+        title = f"joint speed limits {'on' if limits else 'off'}"
+        console.print()
+        console.print(summary_table(experiment, [r for r in rows if r.velocity_limits == limits], title))
+
+    out: pathlib.Path = arguments.out
+    stem = f"{experiment.robot}-{experiment.path.name}"
+    if arguments.gains and not arguments.method:
+        stem += "-gains"
+    if arguments.format != "none":
+        for run in runs:
+            name = run.method.file_name + ("-limits" if run.velocity_limits else "")
+            ex.save_run(run, out / f"{stem}-{name}.{arguments.format}", arguments.format)
+        print(f"time series: {len(runs)} files {out / stem}-*.{arguments.format}")
+    table = ex.save_summary(rows, out / f"{stem}.csv")
+    if arguments.no_plot:
+        print(table)
+        return 0
+    print(f"table: {table}")
+
+    from . import plots
+
+    print(plots.save_figure(plots.experiment_figure(runs), out / f"{stem}.png"))
+    return 0
+
+
+def _methods(arguments: argparse.Namespace, settings: ex.Settings) -> list[ex.NamedMethod]:
+    methods = []
+    if arguments.gains:
+        methods += ex.singular_gain_sweep(_numbers("--gains", arguments.gains), settings.gamma)
+    if arguments.method or not methods:
+        methods = ex.parse_methods(arguments.method or ["all"], settings) + methods
+    return methods
+
+
+def _limits(choice: str, chain: sk.Chain) -> list[bool]:
+    if choice == "both" and not np.isfinite(chain.limits.velocity).any():
+        return [False]
+    return {"on": [True], "off": [False], "both": [False, True]}[choice]
+
+
+def _run_all(
+    experiment: ex.Experiment, methods: Sequence[ex.NamedMethod], limits: Sequence[bool]
+) -> list[ex.Run]:
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    runs = []
+    columns = (TextColumn("{task.description:<40}"), BarColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        task = progress.add_task("", total=experiment.samples * len(methods) * len(limits))
+        for held in limits:
+            for method in methods:
+                progress.update(task, description=f"{method.label}{', speed limits on' if held else ''}")
+                runs.append(ex.run(experiment, method, held, lambda cycles: progress.advance(task, cycles)))
+    return runs
+
+
+def _headline(experiment: ex.Experiment) -> str:
+    s = experiment.settings
+    posture = f"posture {s.posture_gain:g}/s" if s.posture_gain else "no posture"
+    return (
+        f"{experiment.robot}, {experiment.path.name}: {experiment.path.description or 'no description'}\n"
+        f"{experiment.path.duration:g} s at {s.rate:g} Hz, gains {s.gain_linear:g} and {s.gain_angular:g}/s, "
+        f"position error capped at {s.max_position_error:g} m, γ = {s.gamma:g}, {posture}"
+    )
+
+
+# --- robots
+
+
+def _robots(_: argparse.Namespace) -> int:
+    console = _console()
+    from rich import box
+    from rich.table import Table
+
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0))
+    table.add_column("arm", no_wrap=True)
+    table.add_column("joints", justify="right")
+    table.add_column("paths of `sigmaik reach`")
+    for name in sk.robots.names():
+        table.add_row(name, str(sk.robots.load(name).dof), ", ".join(ex.names(name)))
+    console.print(table)
+    return 0
+
+
+# --- info
+
+
+def _add_info(parser: argparse.ArgumentParser) -> None:
+    parser.description = "Joints, limits, reach, and the pose and singular values at a configuration."
+    parser.add_argument("robot", metavar="ARM_OR_URDF", help="a shipped arm or a URDF file")
+    parser.add_argument("--base", help="base link (the URDF's root)")
+    parser.add_argument("--tip", help="tip link (the URDF's only leaf)")
+    parser.add_argument(
+        "--q", metavar="Q", default="home", help="home, zero, or a comma list: --q=-0.1,0.2,… (%(default)s)"
+    )
+    parser.add_argument(
+        "--samples", type=int, default=2000, help="configurations to measure the reach at (%(default)s)"
+    )
+    parser.add_argument("--seed", type=int, default=0, help="of these configurations (%(default)s)")
+    parser.set_defaults(run=_info)
+
+
+def _info(arguments: argparse.Namespace) -> int:
+    console = _console()
+    from rich import box
+    from rich.table import Table
+
+    name, chain, home = load_arm(arguments.robot, arguments.base, arguments.tip)
+    q = _configuration("--q", arguments.q, chain, home)
+    if arguments.samples < 1 or arguments.seed < 0:
+        raise ValueError("--samples must be positive, and --seed not negative")
+    source = sk.robots.path(name) if arguments.robot in sk.robots.names() else pathlib.Path(arguments.robot)
+    text = source.read_text(encoding="utf-8")
+
+    console.print(f"{name}: {chain.dof} joints from '{chain.base}' to '{chain.tip}'", highlight=False)
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0))
+    for head in ("joint", "type"):
+        table.add_column(head)
+    for head in ("lower", "upper", "speed", "accel.", "effort", "q"):
+        table.add_column(head, justify="right", no_wrap=True)
+    limits = chain.limits
+    for i, joint in enumerate(chain.joint_names):
+        values = (limits.lower, limits.upper, limits.velocity, limits.acceleration, limits.effort, q)
+        table.add_row(joint, chain.joint_types[i], *(_figure(float(v[i])) for v in values))
+    console.print(table)
+    console.print("rad, rad/s, rad/s², N·m; m and N for prismatic joints; – is no limit", highlight=False)
+
+    farthest = _sampled_reach(chain, arguments.samples, arguments.seed)
+    bound = _reach_bound(text, chain)
+    console.print(
+        f"\nreach from the base's origin: {farthest:.3f} m at the best of {arguments.samples} random "
+        f"configurations, at most {bound:.3f} m (sum of link offsets)",
+        highlight=False,
+    )
+    pose = chain.pose(q)
+    console.print(f"\nat q = {arguments.q}, tip in base:", highlight=False)
+    for row in pose[:3]:
+        console.print("  " + " ".join(f"{v + 0.0:9.4f}" for v in row), highlight=False)
+    sigma = np.linalg.svd(chain.jacobian(q), compute_uv=False)
+    ratio = sigma[-1] / sigma[0] if sigma[0] > 0.0 else 0.0
+    console.print("singular values: " + " ".join(f"{s:.4g}" for s in sigma), highlight=False)
+    console.print(f"σ_min/σ_max: {ratio:.4g}", highlight=False)
+    return 0
+
+
+def _sampled_reach(chain: sk.Chain, samples: int, seed: int) -> float:
+    generator = np.random.default_rng(seed)
+    return max(
+        float(np.linalg.norm(chain.pose(chain.random_configuration(generator))[:3, 3]))
+        for _ in range(samples)
+    )
+
+
+def _reach_bound(text: str, chain: sk.Chain) -> float:
+    """Sum of the lengths of all joint origins from base to tip [m], and of the travel of prismatic joints."""
+    joints = {}
+    for joint in ElementTree.fromstring(text).findall("joint"):
+        child = joint.find("child")
+        if child is not None:
+            joints[child.get("link")] = joint
+    farthest = np.maximum(np.abs(chain.limits.lower), np.abs(chain.limits.upper))
+    travel = dict(zip(chain.joint_names, farthest, strict=True))
+    link: str | None = chain.tip
+    total = 0.0
+    while link != chain.base and link in joints:
+        joint = joints[link]
+        origin, parent = joint.find("origin"), joint.find("parent")
+        xyz = (origin.get("xyz") if origin is not None else None) or "0 0 0"
+        total += math.hypot(*(float(x) for x in xyz.split()))
+        if joint.get("type") == "prismatic":
+            total += float(travel[joint.get("name") or ""])
+        link = parent.get("link") if parent is not None else None
+    return total
+
+
+# --- helpers
+
+
+def _console() -> Console:
+    _need("rich")
+    from rich.console import Console
+
+    return Console(soft_wrap=False)
+
+
+def _need(package: str) -> None:
+    if importlib.util.find_spec(package) is None:
+        raise _Missing(f"{package} is not installed; pip install 'sigmaik[demo]' brings it")
+
+
+def _configuration(option: str, text: str, chain: sk.Chain, home: Array) -> Array:
+    if text == "home":
+        return home
+    if text == "zero":
+        return np.zeros(chain.dof)
+    values = _numbers(option, text)
+    if len(values) != chain.dof:
+        raise ValueError(f"{option} has {len(values)} values, but the arm has {chain.dof} joints")
+    return np.array(values)
+
+
+def _numbers(option: str, text: str) -> list[float]:
+    values = []
+    for part in text.split(","):
+        try:
+            value = float(part)
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value):
+            raise ValueError(f"{option} is a comma list of numbers; '{part.strip()}' is none")
+        values.append(value)
+    return values
+
+
+def _figure(value: float) -> str:
+    return "–" if math.isinf(value) else f"{value + 0.0:.3f}"
+
+
+def _one_line(error: Exception) -> str:
+    if isinstance(error, OSError) and error.strerror:
+        return f"{error.filename}: {error.strerror}" if error.filename else error.strerror
+    return " ".join(str(error).split())
+
+
+if __name__ == "__main__":
+    sys.exit(main())
