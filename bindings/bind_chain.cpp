@@ -32,6 +32,8 @@ py::array_t<double> map_configurations(const Chain& chain, const py::object& obj
   return out;
 }
 
+using Strings = py::typing::Tuple<py::str, py::ellipsis>;
+
 template <int kRows>
 using RowMajor = Eigen::Matrix<double, kRows, Eigen::Dynamic, Eigen::RowMajor>;
 
@@ -94,11 +96,11 @@ void bind_chain(py::module_& m) {
       .def_property_readonly("dof", &Chain::dof, "Number of movable joints, n.")
       .def_property_readonly("base", &Chain::base, "Name of the base link.")
       .def_property_readonly("tip", &Chain::tip, "Name of the tip link.")
-      .def_property_readonly("joint_names", [](const Chain& c) { return py::tuple(py::cast(c.joint_names())); },
+      .def_property_readonly("joint_names", [](const Chain& c) -> Strings { return py::tuple(py::cast(c.joint_names())); },
                              "Names of the movable joints, base to tip.")
       .def_property_readonly(
           "joint_types",
-          [](const Chain& c) {
+          [](const Chain& c) -> Strings {
             py::list types;
             for (const JointType type : c.joint_types()) types.append(to_string(type));
             return py::tuple(types);

@@ -45,7 +45,8 @@ void finish(py::class_<Rule>& c, Arguments arguments) {
     return py::isinstance<Rule>(b) && arguments(a).equal(arguments(b.cast<const Rule&>()));
   });
   c.def("__hash__", [](const py::object& self) { return py::hash(py::repr(self)); });
-  c.def("__reduce__", [arguments](const py::object& self) {
+  using Recipe = py::typing::Tuple<py::object, py::typing::Tuple<py::object, py::ellipsis>>;
+  c.def("__reduce__", [arguments](const py::object& self) -> Recipe {
     const auto partial = py::module_::import("functools").attr("partial");
     return py::make_tuple(partial(py::type::of(self), **arguments(self.cast<const Rule&>())), py::tuple());
   });

@@ -33,7 +33,7 @@ void bind_servo(py::module_& m) {
       .def_readonly("scale", &ServoStep::scale, "In [0, 1]: what limits left of the rule's answer.")
       .def_property_readonly(
           "limiting_joints",
-          [](const ServoStep& s) {
+          [](const ServoStep& s) -> py::typing::Tuple<py::int_, py::ellipsis> {
             py::list joints;
             for (int i = 0; i < s.q.size(); ++i) {
               if ((s.limiting_joints >> i & 1u) != 0) joints.append(i);

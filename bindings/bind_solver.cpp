@@ -3,6 +3,8 @@
 namespace sigmaik::bindings {
 namespace {
 
+using Plain = py::array_t<double>;
+
 py::array_t<bool> singular_mask(std::uint8_t bits, py::ssize_t size) {
   py::array_t<bool> out(size);
   for (py::ssize_t i = 0; i < size; ++i) out.mutable_data()[i] = (bits >> i & 1u) != 0;
@@ -19,7 +21,7 @@ void bind_solver(py::module_& m) {
       .def(py::init<>())
       .def(
           "decompose",
-          [](Spectrum& s, const py::object& jacobian) {
+          [](Spectrum& s, const py::object& jacobian) -> py::typing::Tuple<Plain, Plain, Plain> {
             s.decompose(jacobian_argument(jacobian, "J"));
             const int m_rows = s.rows(), n = s.cols(), size = s.size();
             Eigen::MatrixXd u(m_rows, m_rows), v(n, size);

@@ -170,7 +170,6 @@ SIGMAIK_INLINE int orthogonalise(JacobiWork<length>& work, int max_sweeps) {
     if (!(peak > 1e-100 && peak < 1e100)) return 0;
     const double noise = peak * (kNoise * kNoise);
     if (left < 1e-9 && polish<k, lanes>(work, noise)) break;
-    const double floor = peak * noise;  // keeps columns of noise out of the cosines
     double worst_cosine = 0.0, worst_tangent = 0.0;  // the cosine is squared
 #pragma GCC unroll 5
     for (int round = 0; round < Order::count; ++round) {
@@ -180,7 +179,7 @@ SIGMAIK_INLINE int orthogonalise(JacobiWork<length>& work, int max_sweeps) {
         const int p = Order::pairs[round][j][0], q = Order::pairs[round][j][1];
         c[j] = to_turn(square[p], square[q], dot<lanes>(work.w[p], work.w[q]), noise);
         d[j] = square[q] - square[p];
-        worst_cosine = larger(worst_cosine, c[j] * c[j] / (square[p] * square[q] + floor));
+        worst_cosine = larger(worst_cosine, c[j] * c[j] / (square[p] * square[q] + 1e-300));
         t[j] = c[j] / (d[j] + __builtin_copysign(1e-300, d[j]));
         ratio = larger(ratio, __builtin_fabs(t[j]));
       }

@@ -5,29 +5,48 @@
 namespace sigmaik {
 namespace {
 
-// Walks from the base to the tip. `joint(i, rotation, position)` sees every joint's frame, whose z is its axis.
+// Columns of a frame, padded to four entries so that they fill vector registers.
+struct FrameColumns {
+  Eigen::Vector4d x{1.0, 0.0, 0.0, 0.0}, y{0.0, 1.0, 0.0, 0.0}, z{0.0, 0.0, 1.0, 0.0}, p{0.0, 0.0, 0.0, 0.0};
+
+  // This frame, then that of `rotation` and `translation` in it.
+  void append(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& translation) noexcept {
+    p += along(translation);
+    const Eigen::Vector4d new_x = along(rotation.col(0)), new_y = along(rotation.col(1));
+    z = along(rotation.col(2));
+    x = new_x;
+    y = new_y;
+  }
+
+ private:
+  template <typename Entries>
+  Eigen::Vector4d along(const Entries& v) const noexcept {
+    return v[0] * x + v[1] * y + v[2] * z;
+  }
+};
+
+// Walks from the base to the tip. `joint(i, frame)` sees every joint's frame, whose z is its axis.
 template <typename Visit>
 Pose walk(const Chain& chain, const JointRef& q, Visit joint) noexcept {
-  const auto& constants = chain.constants();
-  Eigen::Matrix3d r = Eigen::Matrix3d::Identity();
-  Eigen::Vector3d p = Eigen::Vector3d::Zero();
-  for (int i = 0; i < chain.dof(); ++i) {
-    const JointConstants& c = constants[static_cast<std::size_t>(i)];
-    p += r * c.translation;
-    r = r * c.rotation;
+  const JointConstants* constants = chain.constants().data();
+  const int n = chain.dof();
+  FrameColumns f;
+  for (int i = 0; i < n; ++i) {
+    const JointConstants& c = constants[i];
+    f.append(c.rotation, c.translation);
     if (c.prismatic) {
-      p += q[i] * r.col(2);
+      f.p += q[i] * f.z;
     } else {
       const double cosine = std::cos(q[i]), sine = std::sin(q[i]);
-      const Eigen::Vector3d x = r.col(0);
-      r.col(0) = cosine * x + sine * r.col(1);
-      r.col(1) = cosine * r.col(1) - sine * x;
+      const Eigen::Vector4d x = f.x;
+      f.x = cosine * x + sine * f.y;
+      f.y = cosine * f.y - sine * x;
     }
-    joint(i, r, p);
+    joint(i, f);
   }
+  f.append(chain.tool().linear(), chain.tool().translation());
   Pose tip;
-  tip.linear() = r * chain.tool().linear();
-  tip.translation() = p + r * chain.tool().translation();
+  tip.matrix() << f.x, f.y, f.z, f.p;
   tip.makeAffine();
   return tip;
 }
@@ -37,8 +56,12 @@ Pose walk(const Chain& chain, const JointRef& q, Visit joint) noexcept {
 bool update(const Chain& chain, const JointRef& q, ChainState& state) noexcept {
   if (q.size() != chain.dof() || !q.allFinite()) return false;
   state.jacobian.resize(6, chain.dof());
-  state.tip = walk(chain, q, [&state](int i, const Eigen::Matrix3d& r, const Eigen::Vector3d& p) {
-    state.jacobian.col(i) << p, r.col(2);  // v follows when the tip is known
+  double* const columns = state.jacobian.data();
+  state.tip = walk(chain, q, [columns](int i, const FrameColumns& f) {
+    for (int k = 0; k < 3; ++k) {
+      columns[6 * i + k] = f.p[k];  // v follows when the tip is known
+      columns[6 * i + 3 + k] = f.z[k];
+    }
   });
   const Eigen::Vector3d tip = state.tip.translation();
   for (int i = 0; i < chain.dof(); ++i) {
@@ -54,7 +77,7 @@ bool update(const Chain& chain, const JointRef& q, ChainState& state) noexcept {
 }
 
 Pose pose(const Chain& chain, const JointRef& q) noexcept {
-  return walk(chain, q, [](int, const Eigen::Matrix3d&, const Eigen::Vector3d&) {});
+  return walk(chain, q, [](int, const FrameColumns&) {});
 }
 
 void jacobian_gradient(const Jacobian& jacobian, JacobianGradient& gradient) noexcept {

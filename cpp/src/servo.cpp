@@ -23,7 +23,7 @@ void check_finite(const char* what, double value, bool zero_allowed, const char*
   require(std::isfinite(value), what, " must be finite");
 }
 
-void check_joints(const char* what, const JointVector& values, const Chain& chain) {
+void check_joints(const char* what, const JointRef& values, const Chain& chain) {
   require(values.size() == chain.dof(), what, " has ", values.size(), " entries, the chain ", chain.dof(), " joints");
   for (int i = 0; i < chain.dof(); ++i) {
     require(std::isfinite(values[i]), what, " of joint '", chain.joint_names()[static_cast<std::size_t>(i)],
@@ -51,12 +51,12 @@ Servo::Servo(Chain chain, const Method& method, const ServoOptions& options)
   if (options.posture.size() != 0) check_joints("posture", options.posture, chain_);
 }
 
-void Servo::reset(const JointVector& q, const JointVector& qdot) {
+void Servo::reset(const JointRef& q, const JointRef& qdot) {
   check_joints("q", q, chain_);
   if (qdot.size() != 0) check_joints("qdot", qdot, chain_);
   q_ = q;
-  qdot_start_ = qdot.size() != 0 ? qdot : JointVector(JointVector::Zero(chain_.dof()));
-  nominal_ = options_.posture.size() != 0 ? options_.posture : q;
+  qdot_start_ = qdot.size() != 0 ? JointVector(qdot) : JointVector(JointVector::Zero(chain_.dof()));
+  nominal_ = options_.posture.size() != 0 ? options_.posture : q_;
   for (int i = 0; i < chain_.dof(); ++i) {
     if (chain_.joint_types()[static_cast<std::size_t>(i)] != JointType::Continuous) continue;
     constexpr double kTurn = 6.283185307179586;
@@ -132,9 +132,10 @@ ServoStep Servo::resolve(const Twist& twist, bool fade) noexcept {
     }
   }
 
-  q_ += options_.dt * step.qdot;
-  step.q = q_;
+  step.q = q_ + options_.dt * step.qdot;
   step.achieved_twist = state_.jacobian * step.qdot;
+  if (!step.q.allFinite() || !step.achieved_twist.allFinite()) return hold(Status::BadInput);  // too large for numbers
+  q_ = step.q;
   sigmaik::update(chain_, q_, state_);
   return step;
 }

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <limits>
 
 #include "jacobi.hpp"
 
@@ -12,7 +11,6 @@ namespace {
 
 using detail::JacobiWork;
 
-constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 constexpr int kMaxSweeps = 30;     // five are usual from a cold start; the bound is for the proof
 constexpr int kRefreshPeriod = 8;  // cycles between clean-ups of the warm start's orthogonality
 
@@ -147,10 +145,10 @@ void Spectrum::decompose_padded(const TaskJacobianRef& jacobian) noexcept {
   const double noise = peak * (detail::kNoise * detail::kNoise);
 
   std::array<int, kMaxTask> order{};
-  for (int i = 0; i < k; ++i) {  // insertion sort, from large to small; noise keeps the last cycle's order
+  for (int i = 0; i < k; ++i) {  // insertion sort, from large to small; what is equal keeps the last cycle's order
     int at = i;
-    for (; at > 0 && work.square[i] > noise && work.square[order[static_cast<std::size_t>(at - 1)]] < work.square[i];
-         --at) {
+    for (const double more = work.square[i] * (1.0 - detail::kNoise);
+         at > 0 && more > noise && work.square[order[static_cast<std::size_t>(at - 1)]] < more; --at) {
       order[static_cast<std::size_t>(at)] = order[static_cast<std::size_t>(at - 1)];
     }
     order[static_cast<std::size_t>(at)] = i;
@@ -161,22 +159,21 @@ void Spectrum::decompose_padded(const TaskJacobianRef& jacobian) noexcept {
     const int from = order[static_cast<std::size_t>(i)];
     const double sigma = std::sqrt(work.square[from]);
     sigma_[static_cast<std::size_t>(i)] = sigma / factor;
-    std::copy_n(work.r[from], kPaddedTask, rotated + i * rotated_stride);
     if (!(work.square[from] > noise)) continue;
     given |= 1u << i;
+    std::copy_n(work.r[from], kPaddedTask, rotated + i * rotated_stride);
     const double inverse = 1.0 / sigma;
     const int count = wide ? kPadded : kPaddedTask;
     for (int j = 0; j < count; ++j) divided[i * divided_stride + j] = inverse * work.w[from][j];
   }
-  std::sort(sigma_.begin(), sigma_.begin() + k, std::greater<>{});  // the noise, too
-  const int wanted = wide ? k : m_;
-  for (int i = 0; i < wanted; ++i) {
+  std::sort(sigma_.begin(), sigma_.begin() + k, std::greater<>{});  // what is equal but for rounding, too
+  // Where there is noise, both vectors go on from the last cycle's: the rotations have stirred them as they liked.
+  const Eigen::Map<Eigen::Matrix<double, kPaddedTask, kMaxTask>> u(u_.data());
+  const Eigen::Map<Eigen::Matrix<double, kMaxJoints, kMaxTask>> v(v_.data());
+  for (int i = 0; i < m_; ++i) {
     if (given >> i & 1u) continue;
-    if (wide) {
-      complete(Eigen::Map<Eigen::Matrix<double, kMaxJoints, kMaxTask>>(divided), i, n_, given);
-    } else {
-      complete(Eigen::Map<Eigen::Matrix<double, kPaddedTask, kMaxTask>>(divided), i, m_, given);
-    }
+    complete(u, i, m_, given);
+    if (i < k) complete(v, i, n_, given);
     given |= 1u << i;
   }
 }

@@ -37,7 +37,7 @@ void VelocitySolver::set_method(const Method& method) {
   method_ = method;
 }
 
-Solution VelocitySolver::solve(const TaskJacobianRef& jacobian, const TaskRef& twist, const JointVector& posture,
+Solution VelocitySolver::solve(const TaskJacobianRef& jacobian, const TaskRef& twist, const JointRef& posture,
                                const Eigen::Matrix3d& rotation) noexcept {
   const auto m = jacobian.rows(), n = jacobian.cols();
   const int asked = task_.rows();
@@ -72,6 +72,7 @@ Solution VelocitySolver::solve(const TaskJacobianRef& jacobian, const TaskRef& t
       rows.row(row) *= length_scale_;
       command[row] *= length_scale_;
     }
+    if (!rows.allFinite() || !command.allFinite()) return refuse(jacobian);
     spectrum_.decompose(rows);
   } else {
     spectrum_.decompose(jacobian);
@@ -80,29 +81,37 @@ Solution VelocitySolver::solve(const TaskJacobianRef& jacobian, const TaskRef& t
 
   Solution s;
   bool exact = resolution.exact;
+  double enough = command.cwiseAbs().maxCoeff();  // what the answer may miss of the command and be exact, times 1e9
   if (posture.size() != 0) {
-    const double enough = 1e-9 * spectrum_.sigma(0) * posture.cwiseAbs().maxCoeff();
+    enough = std::max(enough, spectrum_.sigma(0) * posture.cwiseAbs().maxCoeff());
     for (std::size_t i = 0; i < static_cast<std::size_t>(spectrum_.size()); ++i) {
       const double along = spectrum_.along_v(static_cast<int>(i), posture);
       resolution.speed[i] -= resolution.projector[i] * along;
-      // Where the projector lets some of the posture through, it moves the tip.
-      if (std::abs(spectrum_.sigma(static_cast<int>(i)) * (1.0 - resolution.projector[i]) * along) > enough) {
-        exact = false;
-      }
     }
     s.qdot = posture + spectrum_.combine_v(resolution.speed);
   } else {
     s.qdot = spectrum_.combine_v(resolution.speed);
   }
-  if (!s.qdot.allFinite()) return refuse(jacobian);  // the command is too large for numbers
+  s.achieved_twist = jacobian.lazyProduct(s.qdot);
+  if (!s.qdot.allFinite() || !s.achieved_twist.allFinite() || !std::isfinite(spectrum_.sigma(0))) {
+    return refuse(jacobian);  // too large for numbers
+  }
 
+  if (exact) {
+    // The rule is; but a posture that its projector lets through moves the tip, and so does rounding of large speeds.
+    TaskVector missed = s.achieved_twist - twist;
+    if (select) missed = select_rows(task_, rotation, Twist(missed));
+    for (int row = 0; row < missed.size(); ++row) {
+      if ((angular >> row & 1u) != 0) missed[row] *= length_scale_;
+    }
+    exact = missed.cwiseAbs().maxCoeff() <= 1e-9 * enough;
+  }
   s.status = exact ? Status::Ok : Status::Damped;
   s.singular = resolution.singular;
   s.singular_values.resize(spectrum_.size());
   for (int i = 0; i < spectrum_.size(); ++i) s.singular_values[i] = spectrum_.sigma(i);
   s.directions.resize(spectrum_.rows(), spectrum_.rows());
   for (int i = 0; i < spectrum_.rows(); ++i) s.directions.col(i) = spectrum_.u(i);
-  s.achieved_twist = jacobian.lazyProduct(s.qdot);
   return s;
 }
 

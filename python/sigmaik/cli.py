@@ -221,7 +221,8 @@ def _run_all(
 
     runs = []
     columns = (TextColumn("{task.description:<40}"), BarColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+    console = Console(stderr=True)
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
         task = progress.add_task("", total=experiment.samples * len(methods) * len(limits))
         for held in limits:
             for method in methods:

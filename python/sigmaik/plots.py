@@ -135,8 +135,12 @@ def save_figure(figure: Figure, file: str | pathlib.Path, dpi: int = 110) -> pat
     buffer.seek(0)
 
     def write(stream: BinaryIO) -> None:
-        image = Image.open(buffer).convert("RGB")
-        image.quantize(colors=128, dither=Image.Dither.NONE).save(stream, format="PNG", optimize=True)
+        image = (
+            Image.open(buffer)
+            .convert("RGB")
+            .quantize(256, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
+        )
+        image.save(stream, format="PNG", optimize=True)
 
     return write_atomically(pathlib.Path(file), write)
 
@@ -187,7 +191,7 @@ def _decorate(axes: Axes, panel: _Panel, run: Run, first: bool) -> None:
         top = panel.ceiling
         gamma = experiment.settings.gamma
         axes.axhline(gamma, color="0.35", linewidth=0.8, linestyle=":")
-        axes.text(0.995, gamma * 1.1, "γ", **note)
+        axes.text(1.006, gamma, "γ", **{**note, "ha": "left", "va": "center", "fontsize": 10})
     if panel is _SPEED:
         speeds = experiment.chain.limits.velocity
         known = speeds[np.isfinite(speeds)]

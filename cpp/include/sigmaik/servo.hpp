@@ -60,7 +60,7 @@ class Servo {
   /// Continuous joints take the turn of the given posture that is nearest to q.
   /// \param qdot (n,) how the arm moves now, from which the command is faded; empty: it stands
   /// \throws Error where a size is wrong or an entry is not finite
-  void reset(const JointVector& q, const JointVector& qdot = {});
+  void reset(const JointRef& q, const JointRef& qdot = JointVector());
 
   /// One cycle towards a pose of the tip in base. Real time. A target that is not a pose is refused: BadInput, q̇ = 0.
   ServoStep update(const Pose& target) noexcept;

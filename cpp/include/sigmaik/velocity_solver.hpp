@@ -41,7 +41,7 @@ class VelocitySolver {
   /// \param twist (m,) [m/s, rad/s]
   /// \param posture (n,) q̇_posture [rad/s or m/s]; empty: none
   /// \param rotation tip in base; used where the task is in tool axes
-  Solution solve(const TaskJacobianRef& jacobian, const TaskRef& twist, const JointVector& posture = {},
+  Solution solve(const TaskJacobianRef& jacobian, const TaskRef& twist, const JointRef& posture = JointVector(),
                  const Eigen::Matrix3d& rotation = Eigen::Matrix3d::Identity()) noexcept;
 
   /// Forgets the warm start: the next answer does not depend on the calls before it.

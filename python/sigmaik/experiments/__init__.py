@@ -3,8 +3,8 @@
     from sigmaik import experiments as ex
 
     experiment = ex.load("ufactory_xarm7", "extended-line")
-    runs = [ex.run(experiment, ex.parse_method(name)) for name in ("jparse", "dls:damping=0.1")]
-    for row in ex.summarize(runs[0]):
+    run = ex.run(experiment, ex.parse_method("jparse", experiment.settings), velocity_limits=True)
+    for row in ex.summarize(run):
         print(row.waypoint, row.position_error)
 
 The paths and settings are those of the J-PARSE paper (Guptasarma et al.) for the xArm7, the Gen3 and the PUMA

@@ -11,7 +11,6 @@ The figures of the J-PARSE paper's paths come from the paper and from its author
 from __future__ import annotations
 
 import csv
-import io
 import json
 import math
 import pathlib
@@ -279,7 +278,7 @@ def _puma_wrist_lock(chain: sk.Chain) -> Path:
         period=40.0,
         cycles=3,
         description="a slow sine along y; axes 4 and 6 line up twice a cycle",
-        start=(0.6113, 1.3090, -3.4032, 1.7273, 0.5268, -1.4136),
+        start=(0.6111, 1.3091, -3.4035, 1.7272, 0.5271, -1.4143),
     )
 
 
@@ -380,16 +379,22 @@ def read_waypoints(file: str | pathlib.Path) -> Path:
 
 
 def _csv_rows(file: pathlib.Path, text: str) -> list[tuple[str, Mapping[str, object]]]:
-    lines = [line if not line.lstrip().startswith("#") else "" for line in text.splitlines()]
-    reader = csv.DictReader(io.StringIO("\n".join(lines)), skipinitialspace=True)
-    header = [name.strip() for name in reader.fieldnames or ()]
+    header: list[str] = []
+    rows: list[tuple[str, Mapping[str, object]]] = []
+    for number, line in enumerate(text.splitlines(), start=1):
+        if not line.strip() or line.lstrip().startswith("#"):
+            continue
+        cells = [cell.strip() for cell in next(csv.reader([line], skipinitialspace=True))]
+        if header:
+            rows.append((f"line {number}", dict(zip(header, cells, strict=False))))
+        else:
+            header = cells
     missing = [column for column in COLUMNS if column not in header]
     if missing:
         raise ValueError(
             f"waypoints '{file}': no column {', '.join(missing)}; the first line names {', '.join(COLUMNS)}"
         )
-    reader.fieldnames = header
-    return [(f"line {reader.line_num}", row) for row in reader]
+    return rows
 
 
 def _json_rows(file: pathlib.Path, text: str) -> list[tuple[str, Mapping[str, object]]]:

@@ -1,0 +1,860 @@
+// The servo, cycle by cycle, on the shipped arms and on random ones.
+
+#include <doctest/doctest.h>
+
+#include <filesystem>
+#include <limits>
+#include <map>
+#include <numbers>
+
+#include <sigmaik/error.hpp>
+#include <sigmaik/pose.hpp>
+#include <sigmaik/servo.hpp>
+
+#include "heap.hpp"
+#include "random.hpp"
+
+namespace {
+
+using namespace sigmaik;
+using test::MatrixXd;
+using test::Random;
+using test::VectorXd;
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+std::vector<Method> all_methods() {
+  return {PseudoInverse{},
+          DampedLeastSquares{},
+          AdaptiveDampedLeastSquares{},
+          AdaptiveDampedLeastSquares{DampingRule::Manipulability},
+          AdaptiveDampedLeastSquares{DampingRule::SmallestSingularValue},
+          SelectivelyDampedLeastSquares{},
+          JParse{},
+          JParse{0.2, 2.0, 0.5, true},
+          JParse{0.2, 2.0, 0.5, false},
+          JacobianProjection{},
+          JacobianSafety{},
+          JacobianSafetyProjection{}};
+}
+
+const std::map<std::string, Chain>& arms() {
+  static const std::map<std::string, Chain> all = [] {
+    std::map<std::string, Chain> found;
+    for (const auto& entry : std::filesystem::directory_iterator(SIGMAIK_ROBOTS_DIR)) {
+      if (entry.path().extension() != ".urdf") continue;
+      found.emplace(entry.path().stem().string(), Chain::from_urdf(entry.path().string(), "", "flange"));
+    }
+    return found;
+  }();
+  return all;
+}
+
+// Inside the limits, away from singularities.
+JointVector regular_configuration(Random& random, const Chain& chain, double least_ratio = 0.08) {
+  for (;;) {
+    JointVector q(chain.dof());
+    for (int i = 0; i < chain.dof(); ++i) {
+      q[i] = random.uniform(std::max(chain.limits().lower[i], -2.5), std::min(chain.limits().upper[i], 2.5));
+    }
+    ChainState state;
+    update(chain, q, state);
+    Spectrum s;
+    s.decompose(state.jacobian);
+    if (s.sigma(s.size() - 1) > least_ratio * s.sigma(0)) return q;
+  }
+}
+
+bool same(const ServoStep& a, const ServoStep& b) {
+  return a.q == b.q && a.qdot == b.qdot && a.status == b.status && a.pose_error == b.pose_error && a.scale == b.scale &&
+         a.limiting_joints == b.limiting_joints && a.achieved_twist == b.achieved_twist;
+}
+
+// What every step must be, whatever was asked.
+void check_step(const Chain& chain, const ServoStep& step, const JointVector& before, double dt) {
+  REQUIRE(step.qdot.size() == chain.dof());
+  REQUIRE(step.q.size() == chain.dof());
+  CHECK(step.qdot.allFinite());
+  CHECK(step.q.allFinite());
+  CHECK(step.achieved_twist.allFinite());
+  for (int i = 0; i < chain.dof(); ++i) CHECK(std::abs(step.qdot[i]) <= chain.limits().velocity[i]);
+  CHECK(step.q == JointVector(before + dt * step.qdot));
+  CHECK(step.scale >= 0.0);
+  CHECK(step.scale <= 1.0);
+  CHECK((step.scale < 1.0) == (step.status == Status::Limited));
+  CHECK((step.limiting_joints != 0) == (step.status == Status::Limited));
+}
+
+}  // namespace
+
+TEST_CASE("every arm reaches what it can reach") {
+  REQUIRE(arms().size() == 9);
+  for (const auto& [name, chain] : arms()) {
+    Random random(1);
+    for (int repeat = 0; repeat < 10; ++repeat) {
+      CAPTURE(name);
+      CAPTURE(repeat);
+      const JointVector start = regular_configuration(random, chain);
+      JointVector goal = start;
+      for (int i = 0; i < chain.dof(); ++i) goal[i] += random.uniform(-0.4, 0.4);
+      const Pose target = pose(chain, goal);
+      ServoOptions options;
+      options.dt = 0.004;
+      Servo servo(chain, JParse{}, options);
+      servo.reset(start);
+      JointVector before = start;
+      ServoStep step;
+      for (int cycle = 0; cycle < 2500; ++cycle) {
+        step = servo.update(target);
+        check_step(chain, step, before, options.dt);
+        before = step.q;
+      }
+      CHECK(step.pose_error.head<3>().norm() < 1e-6);
+      CHECK(step.pose_error.tail<3>().norm() < 1e-6);
+      CHECK((servo.tip().matrix() - target.matrix()).cwiseAbs().maxCoeff() < 1e-6);
+      CHECK(servo.q() == step.q);
+    }
+  }
+}
+
+TEST_CASE("velocity limits: kept without tolerance, by scaling, and the joints named that asked for it") {
+  Random random(2);
+  int limited = 0;
+  for (const auto& [name, shipped] : arms()) {
+    for (int repeat = 0; repeat < 20; ++repeat) {
+      CAPTURE(name);
+      JointLimits limits = shipped.limits();
+      for (int i = 0; i < shipped.dof(); ++i) limits.velocity[i] = random.decades(-2.0, 0.5);
+      if (random.chance(0.3)) limits.velocity[random.integer(0, shipped.dof() - 1)] = kInfinity;
+      const Chain chain = shipped.with_limits(limits);
+      const Method method = all_methods()[static_cast<std::size_t>(repeat) % all_methods().size()];
+      ServoOptions options;
+      options.soft_start = 0.0;
+      options.gain_linear = options.gain_angular = random.decades(0.0, 2.0);
+      Servo servo(chain, method, options);
+      JointVector before = regular_configuration(random, chain);
+      servo.reset(before);
+      const Pose target = pose(chain, regular_configuration(random, chain));
+      for (int cycle = 0; cycle < 100; ++cycle) {
+        ChainState state;
+        update(chain, before, state);
+        const ServoStep step = servo.update(target);
+        check_step(chain, step, before, options.dt);
+        CHECK((step.achieved_twist - state.jacobian * step.qdot).norm() < 1e-14 * (1.0 + step.qdot.norm()));
+        if (step.status == Status::Limited) {
+          ++limited;
+          // What the rule alone would have said.
+          Twist twist = pose_error(state.tip, target);
+          CHECK(twist == step.pose_error);
+          twist.head<3>() *= std::min(1.0, options.max_linear_error / twist.head<3>().norm()) * options.gain_linear;
+          twist.tail<3>() *= std::min(1.0, options.max_angular_error / twist.tail<3>().norm()) * options.gain_angular;
+          VelocitySolver solver(method);
+          const VectorXd asked = solver.solve(state.jacobian, twist).qdot;
+          CHECK((step.qdot - step.scale * asked).norm() < 1e-7 * (step.qdot.norm() + 1e-3));
+          for (int i = 0; i < chain.dof(); ++i) {
+            const bool named = (step.limiting_joints >> i & 1) != 0;
+            const double part = std::abs(step.qdot[i]) / limits.velocity[i];
+            if (named) CHECK(part == doctest::Approx(1.0).epsilon(1e-11));
+            if (part > 1.0 - 1e-13) CHECK(named);
+          }
+        }
+        before = step.q;
+      }
+    }
+  }
+  CHECK(limited > 3000);
+}
+
+TEST_CASE("without velocity limits nothing is held back") {
+  const Chain& chain = arms().at("ufactory_xarm7");
+  ServoOptions options;
+  options.velocity_limits = false;
+  options.soft_start = 0.0;
+  Servo servo(chain, JParse{}, options);
+  Random random(3);
+  servo.reset(regular_configuration(random, chain));
+  Twist twist = Twist::Zero();
+  twist[0] = 50.0;
+  const ServoStep step = servo.update_twist(twist);
+  CHECK(step.status == Status::Ok);
+  CHECK(step.scale == 1.0);
+  CHECK((step.qdot.cwiseAbs() - chain.limits().velocity).maxCoeff() > 0.0);
+}
+
+TEST_CASE("reset: no kick towards one's own pose, posture pinned") {
+  Random random(4);
+  for (const auto& [name, chain] : arms()) {
+    for (const Method& method : all_methods()) {
+      CAPTURE(name);
+      ServoOptions options;
+      options.posture_gain = 3.0;
+      options.soft_start = 0.0;
+      Servo servo(chain, method, options);
+      const JointVector start = regular_configuration(random, chain);
+      servo.reset(start);
+      const Pose own = servo.tip();
+      CHECK(own.matrix() == pose(chain, start).matrix());
+      for (int cycle = 0; cycle < 50; ++cycle) {
+        const ServoStep step = servo.update(own);
+        CHECK(step.qdot.norm() < 1e-12);
+        CHECK(step.status <= Status::Damped);  // of rounding
+      }
+      CHECK((servo.q() - start).norm() < 1e-13);
+    }
+  }
+}
+
+TEST_CASE("reset: everything before is forgotten") {
+  Random random(5);
+  for (const auto& [name, chain] : arms()) {
+    CAPTURE(name);
+    ServoOptions options;
+    options.posture_gain = 1.0;
+    Servo used(chain, JParse{}, options), fresh(chain, JParse{}, options);
+    used.reset(regular_configuration(random, chain), random.vector(chain.dof()));
+    for (int cycle = 0; cycle < 37; ++cycle) used.update(pose(chain, regular_configuration(random, chain)));
+    const JointVector start = regular_configuration(random, chain);
+    const Pose target = pose(chain, regular_configuration(random, chain));
+    used.reset(start);
+    fresh.reset(start);
+    for (int cycle = 0; cycle < 300; ++cycle) {
+      const ServoStep a = used.update(target), b = fresh.update(target);
+      REQUIRE(same(a, b));
+    }
+  }
+}
+
+TEST_CASE("soft start: a pose target's command grows from nothing, a twist's is there at once") {
+  Random random(6);
+  for (const auto& [name, chain] : arms()) {
+    CAPTURE(name);
+    ServoOptions soft, hard;
+    soft.soft_start = 0.1;
+    hard.soft_start = 0.0;
+    soft.velocity_limits = hard.velocity_limits = false;
+    const JointVector start = regular_configuration(random, chain);
+    const Pose target = pose(chain, regular_configuration(random, chain));
+    Servo a(chain, JParse{}, soft), b(chain, JParse{}, hard);
+    a.reset(start);
+    b.reset(start);
+    const VectorXd full = b.update(target).qdot;
+    VectorXd last = VectorXd::Zero(chain.dof());
+    for (int cycle = 0; cycle < 150; ++cycle) {
+      const VectorXd now = a.update(target).qdot;
+      if (cycle == 0) CHECK((now - 0.01 * full).norm() < 1e-12 * full.norm());
+      CHECK((now - last).norm() < 0.05 * full.norm());
+      last = now;
+    }
+    a.reset(start);
+    b.reset(start);
+    const Twist twist = 0.1 * random.vector(6);
+    for (int cycle = 0; cycle < 150; ++cycle) REQUIRE(same(a.update_twist(twist), b.update_twist(twist)));
+  }
+}
+
+TEST_CASE("reset with a velocity: the command starts from how the arm moves") {
+  Random random(7);
+  for (const auto& [name, chain] : arms()) {
+    CAPTURE(name);
+    ServoOptions options;
+    options.velocity_limits = false;
+    const JointVector start = regular_configuration(random, chain), moving = 0.3 * random.vector(chain.dof());
+    const Pose target = pose(chain, regular_configuration(random, chain));
+    for (const bool twist : {false, true}) {
+      ServoOptions hard = options;
+      hard.soft_start = 0.0;
+      Servo servo(chain, JParse{}, options), full(chain, JParse{}, hard);
+      servo.reset(start, moving);
+      for (int cycle = 1; cycle <= 200; ++cycle) {
+        full.reset(servo.q());
+        const Twist command = Twist::Constant(0.02);
+        const ServoStep step = twist ? servo.update_twist(command) : servo.update(target);
+        const VectorXd asked = twist ? full.update_twist(command).qdot : full.update(target).qdot;
+        const double share = std::min(1.0, 0.01 * cycle);
+        CHECK((step.qdot - share * asked - (1.0 - share) * moving).norm() < 1e-6 * (1.0 + asked.norm()));
+      }
+    }
+    // Not even then are velocity limits broken.
+    Servo limited(chain, JParse{});
+    limited.reset(start, JointVector(1e3 * moving));
+    JointVector before = start;
+    for (int cycle = 0; cycle < 200; ++cycle) {
+      const ServoStep step = limited.update(target);
+      check_step(chain, step, before, 1e-3);
+      before = step.q;
+    }
+  }
+}
+
+TEST_CASE("what is not a pose or a twist is refused, and leaves no trace") {
+  Random random(8);
+  for (const auto& [name, chain] : arms()) {
+    CAPTURE(name);
+    ServoOptions options;
+    options.posture_gain = 1.0;
+    Servo servo(chain, JParse{}, options), untouched(chain, JParse{}, options);
+    const JointVector start = regular_configuration(random, chain);
+    const Pose target = pose(chain, regular_configuration(random, chain));
+    servo.reset(start);
+    untouched.reset(start);
+    for (int cycle = 0; cycle < 200; ++cycle) {
+      const JointVector before = servo.q();
+      std::vector<ServoStep> refused;
+      for (const double bad : {kNan, kInfinity, -kInfinity}) {
+        Pose wrong = target;
+        wrong.matrix()(random.integer(0, 3), random.integer(0, 3)) = bad;
+        refused.push_back(servo.update(wrong));
+        Twist twist = Twist::Zero();
+        twist[random.integer(0, 5)] = bad;
+        refused.push_back(servo.update_twist(twist));
+      }
+      Pose wrong = target;
+      wrong.linear() *= 1.001;
+      refused.push_back(servo.update(wrong));
+      wrong = target;
+      wrong.linear().col(1) *= -1.0;
+      refused.push_back(servo.update(wrong));
+      wrong.matrix().setZero();
+      refused.push_back(servo.update(wrong));
+      for (const ServoStep& step : refused) {
+        CHECK(step.status == Status::BadInput);
+        CHECK(step.qdot.size() == chain.dof());
+        CHECK(step.qdot.isZero(0.0));
+        CHECK(step.achieved_twist.isZero(0.0));
+        CHECK(step.q == before);
+      }
+      CHECK(servo.q() == before);
+      REQUIRE(same(servo.update(target), untouched.update(target)));
+    }
+  }
+}
+
+TEST_CASE("before reset() the servo holds") {
+  Servo servo(arms().at("ur10"), JParse{});
+  CHECK(servo.q().size() == 0);
+  for (const ServoStep& step : {servo.update(Pose::Identity()), servo.update_twist(Twist::Zero())}) {
+    CHECK(step.status == Status::BadInput);
+    CHECK(step.qdot.size() == 6);
+    CHECK(step.qdot.isZero(0.0));
+  }
+}
+
+TEST_CASE("reset refuses wrong sizes and values, and keeps what there was") {
+  Random random(9);
+  const Chain& chain = arms().at("ufactory_xarm7");
+  Servo servo(chain, JParse{});
+  CHECK_THROWS_AS(servo.reset(VectorXd::Zero(6)), Error);
+  CHECK(servo.q().size() == 0);
+  const JointVector start = regular_configuration(random, chain);
+  servo.reset(start);
+  const Pose target = pose(chain, regular_configuration(random, chain));
+  servo.update(target);
+  const JointVector q = servo.q();
+  for (const int n : {0, 1, 6, 8, 16, 17, 20, 1000}) {
+    const VectorXd wrong = VectorXd::Zero(n);
+    CHECK_THROWS_AS(servo.reset(wrong), Error);
+    if (n != 0) CHECK_THROWS_AS(servo.reset(start, wrong), Error);
+  }
+  for (const double bad : {kNan, kInfinity, -kInfinity}) {
+    JointVector wrong = start;
+    wrong[3] = bad;
+    CHECK_THROWS_AS(servo.reset(wrong), Error);
+    CHECK_THROWS_AS(servo.reset(start, wrong), Error);
+  }
+  CHECK(servo.q() == q);
+}
+
+TEST_CASE("options out of their range are refused") {
+  const Chain& chain = arms().at("ufactory_xarm7");
+  const auto refuses = [&chain](auto change) {
+    ServoOptions options;
+    change(options);
+    CHECK_THROWS_AS(Servo(chain, JParse{}, options), Error);
+  };
+  for (const double bad : {kNan, -1.0, -kInfinity}) {
+    refuses([bad](ServoOptions& o) { o.dt = bad; });
+    refuses([bad](ServoOptions& o) { o.gain_linear = bad; });
+    refuses([bad](ServoOptions& o) { o.gain_angular = bad; });
+    refuses([bad](ServoOptions& o) { o.max_linear_error = bad; });
+    refuses([bad](ServoOptions& o) { o.max_angular_error = bad; });
+    refuses([bad](ServoOptions& o) { o.soft_start = bad; });
+    refuses([bad](ServoOptions& o) { o.posture_gain = bad; });
+    refuses([bad](ServoOptions& o) { o.posture_max_speed = bad; });
+    refuses([bad](ServoOptions& o) { o.length_scale = bad; });
+  }
+  refuses([](ServoOptions& o) { o.dt = 0.0; });
+  refuses([](ServoOptions& o) { o.dt = kInfinity; });
+  refuses([](ServoOptions& o) { o.gain_linear = kInfinity; });
+  refuses([](ServoOptions& o) { o.gain_angular = kInfinity; });
+  refuses([](ServoOptions& o) { o.posture_gain = kInfinity; });
+  refuses([](ServoOptions& o) { o.soft_start = kInfinity; });
+  refuses([](ServoOptions& o) { o.max_linear_error = 0.0; });
+  refuses([](ServoOptions& o) { o.max_angular_error = 0.0; });
+  refuses([](ServoOptions& o) { o.posture_max_speed = 0.0; });
+  refuses([](ServoOptions& o) { o.length_scale = 0.0; });
+  refuses([](ServoOptions& o) { o.posture = VectorXd::Zero(6); });
+  refuses([](ServoOptions& o) { o.posture = VectorXd::Constant(7, kNan); });
+  refuses([](ServoOptions& o) { o.task.mask.fill(false); });
+  CHECK_THROWS_AS(Servo(chain, JParse{2.0}), Error);
+  ServoOptions fine;
+  fine.max_linear_error = fine.max_angular_error = fine.posture_max_speed = kInfinity;
+  fine.gain_linear = fine.gain_angular = fine.soft_start = 0.0;
+  CHECK_NOTHROW(Servo(chain, JParse{}, fine));
+}
+
+TEST_CASE("targets that jump: always finite, always within the limits, and reached when they rest") {
+  for (const auto& [name, chain] : arms()) {
+    for (const Method& method : all_methods()) {
+      Random random(10);
+      CAPTURE(name);
+      CAPTURE(sigmaik::name(method));
+      ServoOptions options;
+      options.dt = 0.01;
+      Servo servo(chain, method, options);
+      JointVector before = regular_configuration(random, chain);
+      servo.reset(before);
+      Pose target;
+      for (int cycle = 0; cycle < 600; ++cycle) {
+        if (cycle % 30 == 0) {
+          target = pose(chain, regular_configuration(random, chain, 0.0));
+          if (random.chance(0.3)) target.translation() *= random.decades(0.0, 3.0);
+        }
+        const ServoStep step = servo.update(target);
+        REQUIRE(step.status != Status::BadInput);
+        check_step(chain, step, before, options.dt);
+        before = step.q;
+      }
+    }
+  }
+}
+
+TEST_CASE("out of reach for ten thousand cycles: stretched out, and still") {
+  for (const auto& [name, chain] : arms()) {
+    Random random(11);
+    for (int repeat = 0; repeat < 2; ++repeat) {
+      CAPTURE(name);
+      CAPTURE(repeat);
+      ServoOptions options;
+      options.dt = 0.004;
+      Servo servo(chain, JParse{}, options);
+      JointVector before = regular_configuration(random, chain);
+      servo.reset(before);
+      Pose target = servo.tip();
+      target.translation() += 4.0 * random.unit(3);
+      double late_path = 0.0, late_speed = 0.0, most_turn = 0.0;
+      VectorXd last = VectorXd::Zero(chain.dof());
+      ServoStep step;
+      for (int cycle = 0; cycle < 10000; ++cycle) {
+        step = servo.update(target);
+        check_step(chain, step, before, options.dt);
+        if (cycle > 9000) {
+          late_path += options.dt * step.qdot.norm();
+          late_speed = std::max(late_speed, step.qdot.norm());
+          most_turn = std::max(most_turn, (step.qdot - last).norm());
+        }
+        last = step.qdot;
+        before = step.q;
+      }
+      CHECK(step.status == Status::Damped);
+      CHECK(step.singular_values[5] < 0.1 * step.singular_values[0]);
+      // Four seconds: what is left is the slow creep of a singular approach, not jitter.
+      CHECK(late_path < 0.2);
+      CHECK(most_turn < 1e-3);
+      MESSAGE(name, " path ", late_path, " speed ", late_speed, " turn ", most_turn);
+    }
+  }
+}
+
+TEST_CASE("a start at an exact singularity: what can move does, what cannot says so") {
+  int feasible = 0, infeasible = 0;
+  for (const auto& [name, chain] : arms()) {
+    ChainState state;
+    const JointVector zero = JointVector::Zero(chain.dof());
+    update(chain, zero, state);
+    Spectrum s;
+    s.decompose(state.jacobian);
+    for (int direction = 0; direction < 12; ++direction) {
+      CAPTURE(name);
+      CAPTURE(direction);
+      Twist unit = Twist::Zero();
+      unit[direction % 6] = direction < 6 ? 1.0 : -1.0;
+      double possible = 0.0, regular = 0.0;  // share of the direction that the arm can do at all, and that is regular
+      for (int i = 0; i < 6; ++i) {
+        const double part = s.u(i).dot(unit);
+        if (s.sigma(i) > 1e-9 * s.sigma(0)) possible += part * part;
+        if (s.sigma(i) > 0.1 * s.sigma(0)) regular += part * part;
+      }
+      for (const bool as_pose : {false, true}) {
+        Servo servo(chain, JParse{});
+        servo.reset(zero);
+        Pose target = servo.tip();
+        target.translation() += 0.05 * unit.head<3>();
+        target.linear() = rotation_exp(0.05 * unit.tail<3>()) * target.linear();
+        JointVector before = zero;
+        bool damped = false;
+        double progress = 0.0;
+        for (int cycle = 0; cycle < 100; ++cycle) {
+          const ServoStep step = as_pose ? servo.update(target) : servo.update_twist(0.05 * unit);
+          check_step(chain, step, before, 1e-3);
+          CHECK(step.status != Status::BadInput);
+          CHECK(step.status != Status::Holding);
+          damped = damped || step.status == Status::Damped;
+          progress += 1e-3 * unit.dot(step.achieved_twist);
+          before = step.q;
+        }
+        if (possible > 1e-6) {
+          ++feasible;
+          CHECK(progress > 1e-9);
+          if (regular > 0.3) CHECK(progress > 1e-4);
+        } else {
+          ++infeasible;
+          CHECK(damped);
+          CHECK(before.cwiseAbs().maxCoeff() < 1e-9);
+        }
+        if (possible < 1.0 - 1e-6) CHECK(damped);
+      }
+    }
+  }
+  MESSAGE(feasible, " feasible, ", infeasible, " infeasible");
+  CHECK(feasible > 100);
+  CHECK(infeasible > 10);
+}
+
+TEST_CASE("every rule, at every arm's zero pose: finite, within the limits, the same each time") {
+  Random random(12);
+  for (const auto& [name, chain] : arms()) {
+    for (const Method& method : all_methods()) {
+      CAPTURE(name);
+      CAPTURE(sigmaik::name(method));
+      Servo first(chain, method), second(chain, method);
+      const JointVector zero = JointVector::Zero(chain.dof());
+      first.reset(zero);
+      second.reset(zero);
+      Pose target = first.tip();
+      target.translation() += 0.3 * random.unit(3);
+      target.linear() = rotation_exp(random.vector(3)) * target.linear();
+      JointVector before = zero;
+      for (int cycle = 0; cycle < 500; ++cycle) {
+        const ServoStep step = first.update(target);
+        check_step(chain, step, before, 1e-3);
+        REQUIRE(same(step, second.update(target)));
+        before = step.q;
+      }
+    }
+  }
+}
+
+TEST_CASE("twists are exact away from singularities") {
+  for (const auto& [name, chain] : arms()) {
+    Random random(13);
+    for (int repeat = 0; repeat < 20; ++repeat) {
+      CAPTURE(name);
+      Servo servo(chain, JParse{0.01});
+      servo.reset(regular_configuration(random, chain));
+      const Pose start = servo.tip();
+      const Twist twist = 0.02 * random.unit(6);
+      int done = 0;
+      for (; done < 1000; ++done) {
+        const ServoStep step = servo.update_twist(twist);
+        if (step.status != Status::Ok) break;
+        CHECK((step.achieved_twist - twist).norm() < 1e-9 * twist.norm());
+        CHECK(step.pose_error.isZero(0.0));
+      }
+      CHECK(done > 100);
+      const double time = 1e-3 * done;
+      CHECK((servo.tip().translation() - start.translation() - time * twist.head<3>()).norm() < 2e-5);
+      const Eigen::Matrix3d turned = rotation_exp(time * twist.tail<3>()) * start.linear();
+      CHECK((servo.tip().linear() - turned).norm() < 2e-5);
+    }
+  }
+}
+
+TEST_CASE("zero commands: nothing moves, and that is as asked") {
+  Random random(14);
+  for (const auto& [name, chain] : arms()) {
+    for (const Method& method : all_methods()) {
+      Servo servo(chain, method);
+      servo.reset(random.chance(0.5) ? JointVector(JointVector::Zero(chain.dof())) : regular_configuration(random, chain));
+      const ServoStep step = servo.update_twist(Twist::Zero());
+      CHECK(step.qdot.isZero(0.0));
+      CHECK(step.status == Status::Ok);
+    }
+  }
+}
+
+TEST_CASE("the posture: moves the joints, not the tip; capped per joint; continuous joints take the nearest turn") {
+  const Chain& chain = arms().at("kinova_gen3_7dof");
+  Random random(15);
+  const double turn = 2.0 * std::numbers::pi;
+  bool continuous = false;
+  for (int repeat = 0; repeat < 30; ++repeat) {
+    const JointVector near = regular_configuration(random, chain, 0.15);
+    JointVector start = near;
+    ServoOptions options;
+    options.soft_start = 0.0;
+    options.posture_gain = 2.0;
+    options.posture_max_speed = 0.3;
+    options.posture = near;
+    for (int i = 0; i < chain.dof(); ++i) {
+      if (chain.joint_types()[static_cast<std::size_t>(i)] != JointType::Continuous) continue;
+      continuous = true;
+      start[i] += turn * random.integer(-3, 3);
+    }
+    Servo same_place(chain, JParse{0.05}, options);
+    same_place.reset(start);
+    for (int cycle = 0; cycle < 10; ++cycle) {
+      CHECK(same_place.update_twist(Twist::Zero()).qdot.norm() < 1e-12);
+    }
+
+    options.posture = JointVector(near + 0.3 * random.vector(chain.dof()));
+    Servo servo(chain, JParse{0.05}, options);
+    servo.reset(start);
+    const Pose own = servo.tip();
+    double from = 0.0, to = 0.0;
+    for (int cycle = 0; cycle < 1000; ++cycle) {
+      const ServoStep step = servo.update(own);
+      // As a projection the posture's motion is no larger than what was projected.
+      CHECK(step.qdot.norm() <= 0.3 * std::sqrt(7.0) + 0.05);
+      VectorXd away = options.posture - step.q;
+      for (int i = 0; i < chain.dof(); ++i) {
+        if (chain.joint_types()[static_cast<std::size_t>(i)] == JointType::Continuous) {
+          away[i] -= turn * std::round(away[i] / turn);
+        }
+      }
+      (cycle == 0 ? from : to) = away.norm();
+    }
+    CHECK(to < from);
+    CHECK((servo.tip().matrix() - own.matrix()).cwiseAbs().maxCoeff() < 1e-3);
+  }
+  CHECK(continuous);
+}
+
+TEST_CASE("position only: the position is reached, the orientation is free") {
+  for (const auto& [name, chain] : arms()) {
+    Random random(16);
+    for (int repeat = 0; repeat < 5; ++repeat) {
+      CAPTURE(name);
+      ServoOptions options;
+      options.task.mask = {true, true, true, false, false, false};
+      options.dt = 0.004;
+      Servo servo(chain, JParse{}, options), other(chain, JParse{}, options);
+      const JointVector start = regular_configuration(random, chain);
+      JointVector goal = start;
+      for (int i = 0; i < chain.dof(); ++i) goal[i] += random.uniform(-0.4, 0.4);
+      Pose target = pose(chain, goal), turned = target;
+      turned.linear() = random.rotation();
+      servo.reset(start);
+      other.reset(start);
+      ServoStep step;
+      for (int cycle = 0; cycle < 2000; ++cycle) {
+        step = servo.update(target);
+        REQUIRE((other.update(turned).q - step.q).norm() < 1e-9);  // what it asks for of the orientation is ignored
+        CHECK(step.singular_values.size() == 3);
+      }
+      CHECK(step.pose_error.head<3>().norm() < 1e-6);
+      CHECK(step.status == Status::Ok);
+    }
+  }
+}
+
+TEST_CASE("with equal gains J-PARSE never increases the error, orientation included") {
+  Random random(17);
+  int descents = 0;
+  for (int repeat = 0; repeat < 3000; ++repeat) {
+    const int n = random.integer(1, 9);
+    const Chain chain = random.chain(n, 0.2);
+    const JointVector q = random.configuration(n);
+    ChainState state;
+    REQUIRE(update(chain, q, state));
+    Pose target = random.pose();
+    if (random.chance(0.5)) target = pose(chain, JointVector(q + random.decades(-3.0, 0.0) * random.vector(n)));
+    ServoOptions options;
+    options.soft_start = 0.0;
+    options.max_linear_error = options.max_angular_error = kInfinity;
+    const double gain = random.uniform(0.0, 4.0);
+    Servo servo(chain, JParse{random.uniform(0.01, 1.0), gain, gain, random.chance(0.5)}, options);
+    servo.reset(q);
+    const Twist error = pose_error(state.tip, target);
+    if (error.tail<3>().norm() > 3.1) continue;  // the logarithm jumps at a half turn
+    const VectorXd qdot = servo.update(target).qdot;
+    CAPTURE(repeat);
+    const double rate = -2.0 * error.dot(state.jacobian * qdot);
+    CHECK(rate <= 1e-12 * error.squaredNorm() * 5.0);
+    if (rate < -1e-3 * error.squaredNorm()) ++descents;
+    // The same by differences: eᵀe along the motion, the logarithm's own derivative included.
+    const double h = 1e-6 / (1.0 + qdot.norm());
+    const Twist ahead = pose_error(pose(chain, JointVector(q + h * qdot)), target);
+    const Twist behind = pose_error(pose(chain, JointVector(q - h * qdot)), target);
+    const double difference = (ahead.squaredNorm() - behind.squaredNorm()) / (2.0 * h);
+    CHECK(difference == doctest::Approx(rate).epsilon(1e-4).scale(1e-4 * (1.0 + error.squaredNorm()) * (1.0 + qdot.norm())));
+  }
+  CHECK(descents > 2000);
+}
+
+TEST_CASE("the error shrinks cycle by cycle") {
+  for (const auto& [name, chain] : arms()) {
+    Random random(18);
+    for (int repeat = 0; repeat < 5; ++repeat) {
+      CAPTURE(name);
+      ServoOptions options;
+      options.max_linear_error = options.max_angular_error = kInfinity;
+      Servo servo(chain, JParse{}, options);
+      servo.reset(regular_configuration(random, chain));
+      const Pose target = pose(chain, regular_configuration(random, chain));
+      if (pose_error(servo.tip(), target).tail<3>().norm() > 3.0) continue;
+      double last = kInfinity;
+      for (int cycle = 0; cycle < 3000; ++cycle) {
+        const double now = servo.update(target).pose_error.squaredNorm();
+        CHECK(now <= last * (1.0 + 1e-5));
+        last = now;
+      }
+    }
+  }
+}
+
+TEST_CASE("half a turn away: it turns, and arrives") {
+  for (const auto& [name, chain] : arms()) {
+    if (name == "puma560") continue;  // its wrist's limits do not matter here, but its wrist is singular on the way
+    Random random(19);
+    CAPTURE(name);
+    const JointVector start = regular_configuration(random, chain, 0.12);
+    ServoOptions options;
+    options.dt = 0.004;
+    Servo servo(chain, JParse{}, options);
+    servo.reset(start);
+    Pose target = servo.tip();
+    target.linear() = target.linear() * Eigen::AngleAxisd(std::numbers::pi, Eigen::Vector3d::UnitZ());
+    const ServoStep first = servo.update(target);
+    CHECK(first.pose_error.tail<3>().norm() == doctest::Approx(std::numbers::pi).epsilon(1e-12));
+    ServoStep step;
+    for (int cycle = 0; cycle < 5000; ++cycle) step = servo.update(target);
+    CHECK(step.pose_error.norm() < 1e-5);
+  }
+}
+
+TEST_CASE("targets and twists beyond all measure") {
+  Random random(20);
+  for (const auto& [name, chain] : arms()) {
+    for (const Method& method : all_methods()) {
+      for (const bool limits : {true, false}) {
+        CAPTURE(name);
+        CAPTURE(sigmaik::name(method));
+        ServoOptions options;
+        options.velocity_limits = limits;
+        options.soft_start = 0.0;
+        if (random.chance(0.3)) options.dt = 1e10;
+        if (random.chance(0.3)) options.max_linear_error = kInfinity;
+        Servo servo(chain, method, options);
+        servo.reset(regular_configuration(random, chain));
+        for (const double size : {1e10, 1e100, 1e160, 1e200, 1e300, 1.7e308}) {
+          CAPTURE(size);
+          Pose target = Pose::Identity();
+          target.translation()[random.integer(0, 2)] = random.chance(0.5) ? size : -size;
+          for (const ServoStep& step : {servo.update(target), servo.update_twist(Twist::Constant(size))}) {
+            CHECK(step.q.allFinite());
+            CHECK(step.qdot.allFinite());
+            CHECK(step.achieved_twist.allFinite());
+            CHECK(step.pose_error.allFinite());
+            if (step.status == Status::BadInput) CHECK(step.qdot.isZero(0.0));
+          }
+          CHECK(servo.q().allFinite());
+        }
+      }
+    }
+  }
+  // Far away is far away: the arm goes there as fast as to any target out of reach.
+  const Chain& chain = arms().at("ufactory_xarm7");
+  ServoOptions options;
+  options.soft_start = 0.0;
+  const JointVector start = regular_configuration(random, chain);
+  VectorXd near;
+  for (const double size : {1e3, 1e100, 1e200, 1e308}) {
+    CAPTURE(size);
+    Servo servo(chain, JParse{}, options);
+    servo.reset(start);
+    Pose target = servo.tip();
+    target.translation()[0] += size;
+    const VectorXd qdot = servo.update(target).qdot;
+    if (near.size() == 0) near = qdot;
+    CHECK((qdot - near).norm() < 1e-9 * near.norm());
+    CHECK(near.norm() > 0.1);
+  }
+}
+
+TEST_CASE("the rule may be changed on the way; a copy goes on by itself") {
+  Random random(21);
+  const Chain& chain = arms().at("franka_panda");
+  Servo servo(chain, JParse{});
+  servo.reset(regular_configuration(random, chain));
+  const Pose target = pose(chain, regular_configuration(random, chain));
+  for (int cycle = 0; cycle < 50; ++cycle) servo.update(target);
+  CHECK_THROWS_AS(servo.set_method(JParse{-1.0}), Error);
+  CHECK(std::get<JParse>(servo.method()).gamma == 0.1);
+  Servo copy = servo;
+  for (int cycle = 0; cycle < 50; ++cycle) REQUIRE(same(servo.update(target), copy.update(target)));
+  servo.set_method(DampedLeastSquares{0.5});
+  CHECK(std::string(sigmaik::name(servo.method())) == "DampedLeastSquares");
+  const JointVector q = servo.q();
+  const ServoStep a = servo.update(target), b = copy.update(target);
+  CHECK(a.qdot != b.qdot);
+  CHECK(a.q == JointVector(q + 1e-3 * a.qdot));
+  CHECK(a.status == Status::Damped);
+}
+
+TEST_CASE("an arm of another size under the same servo moves the same") {
+  Random random(22);
+  for (const auto& [name, chain] : arms()) {
+    for (const double size : {0.1, 10.0, 1000.0}) {
+      CAPTURE(name);
+      std::vector<Segment> segments = chain.segments();
+      for (Segment& s : segments) s.origin.translation() *= size;
+      const Chain other(chain.base(), segments);
+      ServoOptions options, scaled;
+      options.length_scale = 0.3;
+      scaled.length_scale = 0.3 * size;
+      scaled.max_linear_error = options.max_linear_error * size;
+      Servo a(chain, JParse{}, options), b(other, JParse{}, scaled);
+      const JointVector start = regular_configuration(random, chain), goal = regular_configuration(random, chain);
+      a.reset(start);
+      b.reset(start);
+      const Pose target = pose(chain, goal), there = pose(other, goal);
+      for (int cycle = 0; cycle < 500; ++cycle) {
+        const ServoStep s = a.update(target), t = b.update(there);
+        REQUIRE((s.q - t.q).norm() < 1e-7);
+      }
+    }
+  }
+}
+
+#ifdef SIGMAIK_TEST_HEAP
+TEST_CASE("update() and update_twist() leave the heap alone, whatever they are given") {
+  Random random(23);
+  for (const auto& [name, chain] : arms()) {
+    for (const Method& method : all_methods()) {
+      for (const Frame frame : {Frame::Base, Frame::Tool}) {
+        ServoOptions options;
+        options.posture_gain = 1.0;
+        options.length_scale = 0.5;
+        options.task.frame = frame;
+        if (random.chance(0.5)) options.task.mask = {true, true, true, true, true, false};
+        Servo servo(chain, method, options);
+        servo.reset(JointVector::Zero(chain.dof()));
+        const Pose target = pose(chain, regular_configuration(random, chain));
+        Pose wrong = target;
+        wrong.matrix()(1, 1) = kNan;
+        ServoStep step;
+        const test::HeapWatch watch;
+        for (int cycle = 0; cycle < 50; ++cycle) {
+          step = servo.update(target);
+          step = servo.update(wrong);
+          step = servo.update_twist(Twist::Constant(0.1));
+          step = servo.update_twist(Twist::Constant(kNan));
+        }
+        CHECK(watch.calls() == 0);
+        CHECK(step.status == Status::BadInput);
+      }
+    }
+  }
+}
+#endif
