@@ -12,11 +12,25 @@
 
 #include <sigmaik/sigmaik.hpp>
 
+#define SIGMAIK_HIDDEN __attribute__((visibility("hidden")))
+
 namespace sigmaik::bindings {
 
 namespace py = pybind11;
 
 using Array = py::array_t<double, py::array::c_style | py::array::forcecast>;
+
+/// What numpy can make an array of; the functions below check it. In the stubs: numpy.typing.ArrayLike.
+class SIGMAIK_HIDDEN ArrayLike : public py::object {
+ public:
+  PYBIND11_OBJECT_DEFAULT(ArrayLike, py::object, any_object)
+
+ private:
+  static bool any_object(PyObject* /*object*/) { return true; }
+};
+using MaybeArray = std::optional<ArrayLike>;
+
+inline py::object object_of(const MaybeArray& array) { return array ? py::object(*array) : py::none(); }
 
 /// "(6, 7)".
 std::string shape_text(const py::array& array);
@@ -71,3 +85,8 @@ void bind_solver(py::module_& m);
 void bind_servo(py::module_& m);
 
 }  // namespace sigmaik::bindings
+
+template <>
+struct pybind11::detail::handle_type_name<sigmaik::bindings::ArrayLike> {
+  static constexpr auto name = const_name("numpy.typing.ArrayLike");
+};

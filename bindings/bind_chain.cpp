@@ -37,10 +37,10 @@ using Strings = py::typing::Tuple<py::str, py::ellipsis>;
 template <int kRows>
 using RowMajor = Eigen::Matrix<double, kRows, Eigen::Dynamic, Eigen::RowMajor>;
 
-JointVector limit_argument(const py::object& object, const char* what, const JointVector& otherwise) {
-  if (object.is_none()) return otherwise;
+JointVector limit_argument(const MaybeArray& object, const char* what, const JointVector& otherwise) {
+  if (!object) return otherwise;
   // Infinite entries are what "no limit" looks like, so finiteness is Chain's business here.
-  Array array = Array::ensure(object);
+  Array array = Array::ensure(*object);
   if (!array) {
     PyErr_Clear();
     throw Error(std::string(what) + " is not an array of numbers");
@@ -72,11 +72,11 @@ void bind_chain(py::module_& m) {
       .def_static(
           "from_urdf",
           [](const py::object& source, const std::optional<std::string>& base, const std::optional<std::string>& tip,
-             const py::object& acceleration) {
+             const MaybeArray& acceleration) {
             const auto text = py::module_::import("os").attr("fspath")(source).cast<std::string>();
             std::vector<double> limits;
-            if (!acceleration.is_none()) {
-              const Array array = Array::ensure(acceleration);
+            if (acceleration) {
+              const Array array = Array::ensure(*acceleration);
               if (!array || array.ndim() != 1) {
                 PyErr_Clear();
                 throw Error("acceleration must be a list of numbers, one a movable joint");
@@ -109,8 +109,8 @@ void bind_chain(py::module_& m) {
       .def_property_readonly("limits", &Chain::limits, "Limits of the movable joints.")
       .def(
           "with_limits",
-          [](const Chain& c, const py::object& lower, const py::object& upper, const py::object& velocity,
-             const py::object& acceleration, const py::object& effort) {
+          [](const Chain& c, const MaybeArray& lower, const MaybeArray& upper, const MaybeArray& velocity,
+             const MaybeArray& acceleration, const MaybeArray& effort) {
             const JointLimits& old = c.limits();
             return c.with_limits({limit_argument(lower, "lower", old.lower), limit_argument(upper, "upper", old.upper),
                                   limit_argument(velocity, "velocity", old.velocity),
@@ -122,7 +122,7 @@ void bind_chain(py::module_& m) {
           "The same arm with other limits: (n,) or one number each, infinite for none; None keeps what there is.")
       .def(
           "pose",
-          [](const Chain& c, const py::object& q) {
+          [](const Chain& c, const ArrayLike& q) {
             return map_configurations(c, q, {4, 4}, [&c](const JointVector& joints, double* out) {
               Eigen::Map<Eigen::Matrix<double, 4, 4, Eigen::RowMajor>> result(out);
               result = pose(c, joints).matrix();
@@ -131,7 +131,7 @@ void bind_chain(py::module_& m) {
           py::arg("q"), "Pose (4, 4) of the tip in the base at q (n,) [rad or m]; (B, 4, 4) at q (B, n).")
       .def(
           "jacobian",
-          [](const Chain& c, const py::object& q) {
+          [](const Chain& c, const ArrayLike& q) {
             ChainState state;
             return map_configurations(c, q, {6, c.dof()}, [&c, &state](const JointVector& joints, double* out) {
               update(c, joints, state);
@@ -142,7 +142,7 @@ void bind_chain(py::module_& m) {
           "Jacobian (6, n) at q (n,): rows [v; ω] in base axes at the tip's origin; (B, 6, n) at q (B, n).")
       .def(
           "jacobian_gradient",
-          [](const Chain& c, const py::object& q) {
+          [](const Chain& c, const ArrayLike& q) {
             ChainState state;
             JacobianGradient gradient;
             const int n = c.dof();

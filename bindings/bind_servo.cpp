@@ -60,9 +60,9 @@ void bind_servo(py::module_& m) {
                     "Drives a chain's reference configuration towards poses, or along twists, one cycle a call.\n\n"
                     "It integrates its own command (q ← q + q̇ dt) and reads no measured positions.")
       .def(py::init([](const Chain& chain, const Method& method, double dt, double gain_linear, double gain_angular,
-                       double max_linear_error, double max_angular_error, double soft_start, const py::object& posture,
+                       double max_linear_error, double max_angular_error, double soft_start, const MaybeArray& posture,
                        double posture_gain, double posture_max_speed, bool velocity_limits, const std::string& on_limit,
-                       double length_scale, const py::object& mask, const std::string& frame) {
+                       double length_scale, const MaybeArray& mask, const std::string& frame) {
              ServoOptions options;
              options.dt = dt;
              options.gain_linear = gain_linear;
@@ -70,13 +70,13 @@ void bind_servo(py::module_& m) {
              options.max_linear_error = max_linear_error;
              options.max_angular_error = max_angular_error;
              options.soft_start = soft_start;
-             options.posture = optional_joint_argument(posture, "posture", chain.dof());
+             options.posture = optional_joint_argument(object_of(posture), "posture", chain.dof());
              options.posture_gain = posture_gain;
              options.posture_max_speed = posture_max_speed;
              options.velocity_limits = velocity_limits;
              options.on_limit = on_limit_argument(on_limit);
              options.length_scale = length_scale;
-             options.task = task_argument(mask, frame);
+             options.task = task_argument(object_of(mask), frame);
              return Servo(chain, method, options);
            }),
            py::arg("chain"), py::arg("method"), py::arg("dt") = 1e-3, py::kw_only(),
@@ -99,8 +99,8 @@ void bind_servo(py::module_& m) {
            "length_scale, mask, frame: as for VelocitySolver.")
       .def(
           "reset",
-          [](Servo& s, const py::object& q, const py::object& qdot) {
-            s.reset(joint_argument(q, "q", s.chain().dof()), optional_joint_argument(qdot, "qdot", s.chain().dof()));
+          [](Servo& s, const ArrayLike& q, const MaybeArray& qdot) {
+            s.reset(joint_argument(q, "q", s.chain().dof()), optional_joint_argument(object_of(qdot), "qdot", s.chain().dof()));
           },
           py::arg("q"), py::arg("qdot") = py::none(),
           "Starts, or starts again, at q (n,): forgets all history, and pins the posture there unless one was given.\n\n"
@@ -116,7 +116,7 @@ void bind_servo(py::module_& m) {
           "Raises Error, and holds, where the target is not a pose.")
       .def(
           "update_twist",
-          [](Servo& s, const py::object& twist) {
+          [](Servo& s, const ArrayLike& twist) {
             require_started(s);
             return checked(s.update_twist(twist_argument(twist, "twist")));
           },

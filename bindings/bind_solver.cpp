@@ -21,7 +21,7 @@ void bind_solver(py::module_& m) {
       .def(py::init<>())
       .def(
           "decompose",
-          [](Spectrum& s, const py::object& jacobian) -> py::typing::Tuple<Plain, Plain, Plain> {
+          [](Spectrum& s, const ArrayLike& jacobian) -> py::typing::Tuple<Plain, Plain, Plain> {
             s.decompose(jacobian_argument(jacobian, "J"));
             const int m_rows = s.rows(), n = s.cols(), size = s.size();
             Eigen::MatrixXd u(m_rows, m_rows), v(n, size);
@@ -67,8 +67,8 @@ void bind_solver(py::module_& m) {
 
   py::class_<VelocitySolver>(m, "VelocitySolver",
                              "Resolves twists at given Jacobians by one method. Keeps only a warm start.")
-      .def(py::init([](const Method& method, double length_scale, const py::object& mask, const std::string& frame) {
-             return VelocitySolver(method, length_scale, task_argument(mask, frame));
+      .def(py::init([](const Method& method, double length_scale, const MaybeArray& mask, const std::string& frame) {
+             return VelocitySolver(method, length_scale, task_argument(object_of(mask), frame));
            }),
            py::arg("method"), py::arg("length_scale") = 1.0, py::arg("mask") = py::none(), py::arg("frame") = "base",
            "length_scale: [m] > 0; 1 rad/s weighs as much as length_scale m/s. In proportion to the arm, it makes\n"
@@ -77,8 +77,8 @@ void bind_solver(py::module_& m) {
            "frame: the axes of these rows, 'base' or 'tool'.")
       .def(
           "solve",
-          [](VelocitySolver& s, const py::object& jacobian, const py::object& twist, const py::object& posture,
-             const py::object& rotation) {
+          [](VelocitySolver& s, const ArrayLike& jacobian, const ArrayLike& twist, const MaybeArray& posture,
+             const MaybeArray& rotation) {
             const TaskJacobian j = jacobian_argument(jacobian, "J");
             const auto rows = j.rows();
             const int asked = s.task().rows();
@@ -88,14 +88,13 @@ void bind_solver(py::module_& m) {
             }
             const std::string need = "(" + std::to_string(rows) + ",), as J has rows";
             const Array t = array_argument(twist, "twist", {rows}, need.c_str());
-            if (rotation.is_none() && rows == 6 && s.task().frame == Frame::Tool) {
+            if (!rotation && rows == 6 && s.task().frame == Frame::Tool) {
               throw Error("the task is in tool axes: solve() needs rotation, the tip's (3, 3) in the base");
             }
             const Solution solution = s.solve(
                 j, TaskVector(Eigen::Map<const Eigen::VectorXd>(t.data(), t.size())),
-                optional_joint_argument(posture, "posture", static_cast<int>(j.cols())),
-                rotation.is_none() ? Eigen::Matrix3d(Eigen::Matrix3d::Identity())
-                                   : rotation_argument(rotation, "rotation"));
+                optional_joint_argument(object_of(posture), "posture", static_cast<int>(j.cols())),
+                rotation ? rotation_argument(*rotation, "rotation") : Eigen::Matrix3d(Eigen::Matrix3d::Identity()));
             if (solution.status == Status::BadInput) throw Error("the command is too large for floating-point numbers");
             return solution;
           },
@@ -113,7 +112,7 @@ void bind_solver(py::module_& m) {
 
   m.def(
       "solve_batch",
-      [](const Method& method, const py::object& jacobian, const py::object& twist, double length_scale, int threads) {
+      [](const Method& method, const ArrayLike& jacobian, const ArrayLike& twist, double length_scale, int threads) {
         const Array j = array_argument(jacobian, "J", {-1, -1, -1}, "(B, m, n)");
         const BatchShape shape{static_cast<std::size_t>(j.shape(0)), static_cast<int>(j.shape(1)),
                                static_cast<int>(j.shape(2))};

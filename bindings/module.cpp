@@ -28,11 +28,11 @@ void bind_status(py::module_& m) {
       "axes of that frame. Right up to and at a half turn.");
   m.def(
       "rotation_log",
-      [](const py::object& rotation) { return to_numpy(rotation_log(rotation_argument(rotation, "rotation"))); },
+      [](const ArrayLike& rotation) { return to_numpy(rotation_log(rotation_argument(rotation, "rotation"))); },
       py::arg("rotation"), "Axis times angle [rad] (3,) of a 3×3 rotation, angle in [0, π].");
   m.def(
       "rotation_exp",
-      [](const py::object& vector) {
+      [](const ArrayLike& vector) {
         const Array array = array_argument(vector, "vector", {3}, "(3,)");
         return to_numpy(rotation_exp(Eigen::Map<const Eigen::Vector3d>(array.data())));
       },

@@ -1,6 +1,7 @@
 #include <sigmaik/batch.hpp>
 
 #include <algorithm>
+#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -37,13 +38,20 @@ void solve_batch(const Method& method, double length_scale, const BatchShape& sh
     }
   };
 
-  const std::size_t workers = std::min<std::size_t>(static_cast<std::size_t>(threads), shape.count);
+  // More threads than cores gain nothing.
+  const unsigned cores = std::max(1u, std::thread::hardware_concurrency());
+  const std::size_t workers = std::min({static_cast<std::size_t>(threads), shape.count, std::size_t{cores}});
   if (workers <= 1) return work(0, shape.count);
   std::vector<std::thread> pool;
   pool.reserve(workers - 1);
   const auto part = [&](std::size_t w) { return shape.count * w / workers; };
-  for (std::size_t w = 1; w < workers; ++w) pool.emplace_back(work, part(w), part(w + 1));
+  std::size_t started = 1;
+  try {
+    for (; started < workers; ++started) pool.emplace_back(work, part(started), part(started + 1));
+  } catch (const std::system_error&) {  // no more threads to be had: the rest is done here
+  }
   work(0, part(1));
+  work(part(started), shape.count);
   for (std::thread& thread : pool) thread.join();
 }
 

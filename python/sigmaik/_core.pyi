@@ -57,7 +57,7 @@ class Chain:
     (Pinocchio's LOCAL_WORLD_ALIGNED). Poses are 4×4, tip in base.
     """
     @staticmethod
-    def from_urdf(source: typing.Any, base: str | None = None, tip: str | None = None, acceleration: typing.Any = None) -> Chain:
+    def from_urdf(source: typing.Any, base: str | None = None, tip: str | None = None, acceleration: numpy.typing.ArrayLike | None = None) -> Chain:
         """
         Reads a URDF.
 
@@ -70,15 +70,15 @@ class Chain:
         """
     def __repr__(self) -> str:
         ...
-    def jacobian(self, q: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
+    def jacobian(self, q: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
         """
         Jacobian (6, n) at q (n,): rows [v; ω] in base axes at the tip's origin; (B, 6, n) at q (B, n).
         """
-    def jacobian_gradient(self, q: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
+    def jacobian_gradient(self, q: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
         """
         ∂J/∂q_k (n, 6, n) at q (n,), k first; (B, n, 6, n) at q (B, n).
         """
-    def pose(self, q: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
+    def pose(self, q: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
         """
         Pose (4, 4) of the tip in the base at q (n,) [rad or m]; (B, 4, 4) at q (B, n).
         """
@@ -88,7 +88,7 @@ class Chain:
 
         seed: what numpy.random.default_rng takes, a Generator included.
         """
-    def with_limits(self, *, lower: typing.Any = None, upper: typing.Any = None, velocity: typing.Any = None, acceleration: typing.Any = None, effort: typing.Any = None) -> Chain:
+    def with_limits(self, *, lower: numpy.typing.ArrayLike | None = None, upper: numpy.typing.ArrayLike | None = None, velocity: numpy.typing.ArrayLike | None = None, acceleration: numpy.typing.ArrayLike | None = None, effort: numpy.typing.ArrayLike | None = None) -> Chain:
         """
         The same arm with other limits: (n,) or one number each, infinite for none; None keeps what there is.
         """
@@ -326,7 +326,7 @@ class Spectrum:
     """
     def __init__(self) -> None:
         ...
-    def decompose(self, J: typing.Any) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
+    def decompose(self, J: numpy.typing.ArrayLike) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
         """
         U (m, m), σ (min(m, n),) from large to small, V (n, min(m, n)) of J (m, n), m ≤ 6, n ≤ 16.
         """
@@ -380,7 +380,7 @@ class VelocitySolver:
     """
     Resolves twists at given Jacobians by one method. Keeps only a warm start.
     """
-    def __init__(self, method: PseudoInverse | DampedLeastSquares | AdaptiveDampedLeastSquares | SelectivelyDampedLeastSquares | JParse | JacobianProjection | JacobianSafety | JacobianSafetyProjection, length_scale: typing.SupportsFloat | typing.SupportsIndex = 1.0, mask: typing.Any = None, frame: str = 'base') -> None:
+    def __init__(self, method: PseudoInverse | DampedLeastSquares | AdaptiveDampedLeastSquares | SelectivelyDampedLeastSquares | JParse | JacobianProjection | JacobianSafety | JacobianSafetyProjection, length_scale: typing.SupportsFloat | typing.SupportsIndex = 1.0, mask: numpy.typing.ArrayLike | None = None, frame: str = 'base') -> None:
         """
         length_scale: [m] > 0; 1 rad/s weighs as much as length_scale m/s. In proportion to the arm, it makes
             answers independent of units and size.
@@ -391,7 +391,7 @@ class VelocitySolver:
         """
         Forgets the warm start.
         """
-    def solve(self, J: typing.Any, twist: typing.Any, posture: typing.Any = None, rotation: typing.Any = None) -> Solution:
+    def solve(self, J: numpy.typing.ArrayLike, twist: numpy.typing.ArrayLike, posture: numpy.typing.ArrayLike | None = None, rotation: numpy.typing.ArrayLike | None = None) -> Solution:
         """
         Joint velocities for a twist.
 
@@ -473,7 +473,7 @@ class Servo:
 
     It integrates its own command (q ← q + q̇ dt) and reads no measured positions.
     """
-    def __init__(self, chain: Chain, method: PseudoInverse | DampedLeastSquares | AdaptiveDampedLeastSquares | SelectivelyDampedLeastSquares | JParse | JacobianProjection | JacobianSafety | JacobianSafetyProjection, dt: typing.SupportsFloat | typing.SupportsIndex = 0.001, *, gain_linear: typing.SupportsFloat | typing.SupportsIndex = 5.0, gain_angular: typing.SupportsFloat | typing.SupportsIndex = 5.0, max_linear_error: typing.SupportsFloat | typing.SupportsIndex = 0.25, max_angular_error: typing.SupportsFloat | typing.SupportsIndex = 1.0, soft_start: typing.SupportsFloat | typing.SupportsIndex = 0.1, posture: typing.Any = None, posture_gain: typing.SupportsFloat | typing.SupportsIndex = 0.0, posture_max_speed: typing.SupportsFloat | typing.SupportsIndex = ..., velocity_limits: bool = True, on_limit: str = 'scale', length_scale: typing.SupportsFloat | typing.SupportsIndex = 1.0, mask: typing.Any = None, frame: str = 'base') -> None:
+    def __init__(self, chain: Chain, method: PseudoInverse | DampedLeastSquares | AdaptiveDampedLeastSquares | SelectivelyDampedLeastSquares | JParse | JacobianProjection | JacobianSafety | JacobianSafetyProjection, dt: typing.SupportsFloat | typing.SupportsIndex = 0.001, *, gain_linear: typing.SupportsFloat | typing.SupportsIndex = 5.0, gain_angular: typing.SupportsFloat | typing.SupportsIndex = 5.0, max_linear_error: typing.SupportsFloat | typing.SupportsIndex = 0.25, max_angular_error: typing.SupportsFloat | typing.SupportsIndex = 1.0, soft_start: typing.SupportsFloat | typing.SupportsIndex = 0.1, posture: numpy.typing.ArrayLike | None = None, posture_gain: typing.SupportsFloat | typing.SupportsIndex = 0.0, posture_max_speed: typing.SupportsFloat | typing.SupportsIndex = ..., velocity_limits: bool = True, on_limit: str = 'scale', length_scale: typing.SupportsFloat | typing.SupportsIndex = 1.0, mask: numpy.typing.ArrayLike | None = None, frame: str = 'base') -> None:
         """
         dt: [s] from one update to the next.
         gain_linear, gain_angular: [1/s] from pose error to twist.
@@ -485,7 +485,7 @@ class Servo:
         velocity_limits: hold the chain's; on_limit 'scale': all joints slow down together.
         length_scale, mask, frame: as for VelocitySolver.
         """
-    def reset(self, q: typing.Any, qdot: typing.Any = None) -> None:
+    def reset(self, q: numpy.typing.ArrayLike, qdot: numpy.typing.ArrayLike | None = None) -> None:
         """
         Starts, or starts again, at q (n,): forgets all history, and pins the posture there unless one was given.
 
@@ -497,7 +497,7 @@ class Servo:
 
         Raises Error, and holds, where the target is not a pose.
         """
-    def update_twist(self, twist: typing.Any) -> ServoStep:
+    def update_twist(self, twist: numpy.typing.ArrayLike) -> ServoStep:
         """
         One cycle along a twist (6,) [v; ω], base axes, at the tip's origin.
         """
@@ -534,15 +534,15 @@ def pose_error(current: typing.Any, target: typing.Any) -> numpy.typing.NDArray[
     e_p [m] is the difference of the origins, e_o [rad] the axis-angle vector of R_target R_currentᵀ, both in the
     axes of that frame. Right up to and at a half turn.
     """
-def rotation_exp(vector: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
+def rotation_exp(vector: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
     """
     Rotation (3, 3) about `vector` by its length [rad].
     """
-def rotation_log(rotation: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
+def rotation_log(rotation: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
     """
     Axis times angle [rad] (3,) of a 3×3 rotation, angle in [0, π].
     """
-def solve_batch(method: PseudoInverse | DampedLeastSquares | AdaptiveDampedLeastSquares | SelectivelyDampedLeastSquares | JParse | JacobianProjection | JacobianSafety | JacobianSafetyProjection, J: typing.Any, twist: typing.Any, length_scale: typing.SupportsFloat | typing.SupportsIndex = 1.0, threads: typing.SupportsInt | typing.SupportsIndex = 1) -> numpy.typing.NDArray[numpy.float64]:
+def solve_batch(method: PseudoInverse | DampedLeastSquares | AdaptiveDampedLeastSquares | SelectivelyDampedLeastSquares | JParse | JacobianProjection | JacobianSafety | JacobianSafetyProjection, J: numpy.typing.ArrayLike, twist: numpy.typing.ArrayLike, length_scale: typing.SupportsFloat | typing.SupportsIndex = 1.0, threads: typing.SupportsInt | typing.SupportsIndex = 1) -> numpy.typing.NDArray[numpy.float64]:
     """
     Joint velocities (B, n) for B independent problems, J (B, m, n) and twist (B, m), without the GIL.
 

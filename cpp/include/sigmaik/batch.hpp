@@ -22,7 +22,7 @@ struct BatchShape {
 /// \param twist (B, m)
 /// \param qdot out: (B, n); zero where the problem is not finite
 /// \param status out: (B,); may be null
-/// \param threads ≥ 1
+/// \param threads ≥ 1, the most that work at once; never more than the machine has cores
 /// \throws Error where a shape or parameter is out of its range
 void solve_batch(const Method& method, double length_scale, const BatchShape& shape, const double* jacobian,
                  const double* twist, double* qdot, std::int8_t* status = nullptr, int threads = 1);
