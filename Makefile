@@ -27,7 +27,7 @@ test: build .venv/.test .venv/.package  ## everything: install, stubs, types, C+
 
 bench: .venv/.bench .venv/.package build/release/build.ninja  ## all benchmarks and the peers: one table, build/bench/bench.json
 	cmake build/release  # finds the solvers that .venv has
-	cmake --build build/release
+	cmake --build build/release --target benchmarks
 	$(BIN)/python bench/report.py
 
 wheel: .venv/.build  ## a wheel that carries its libraries, in dist/, checked in an empty environment

@@ -49,22 +49,25 @@ def machine(build: pathlib.Path) -> dict[str, Any]:
 
 def kernels(build: pathlib.Path, repetitions: int, seconds: float) -> dict[str, dict[str, float]]:
     """Median of the repetitions, which are interleaved at random, by benchmark."""
-    run = subprocess.run(
-        [
-            build / "sigmaik_bench",
-            "--benchmark_format=json",
-            "--benchmark_enable_random_interleaving=true",
-            f"--benchmark_repetitions={repetitions}",
-            f"--benchmark_min_time={seconds}",
-        ],
-        stdout=subprocess.PIPE,
-        check=True,
-    )
-    return {
-        b["run_name"].removesuffix("/real_time"): b
-        for b in json.loads(run.stdout)["benchmarks"]
-        if b.get("aggregate_name") == "median"
-    }
+    found = {}
+    for binary in ("sigmaik_bench", "sigmaik_bench_qp"):
+        if not (build / binary).exists():  # the QP solvers are optional
+            continue
+        run = subprocess.run(
+            [
+                build / binary,
+                "--benchmark_format=json",
+                "--benchmark_enable_random_interleaving=true",
+                f"--benchmark_repetitions={repetitions}",
+                f"--benchmark_min_time={seconds}",
+            ],
+            stdout=subprocess.PIPE,
+            check=True,
+        )
+        for benchmark in json.loads(run.stdout)["benchmarks"]:
+            if benchmark.get("aggregate_name") == "median":
+                found[benchmark["run_name"].removesuffix("/real_time")] = benchmark
+    return found
 
 
 def instructions(directory: pathlib.Path) -> float | None:

@@ -44,7 +44,9 @@ void finish(py::class_<Rule>& c, Arguments arguments) {
   c.def("__eq__", [arguments](const Rule& a, const py::object& b) {
     return py::isinstance<Rule>(b) && arguments(a).equal(arguments(b.cast<const Rule&>()));
   });
-  c.def("__hash__", [](const py::object& self) { return py::hash(py::repr(self)); });
+  c.def("__hash__", [arguments](const Rule& self) {  // by the values, as equality: −0.0 is 0.0
+    return py::hash(py::make_tuple(py::type::of<Rule>(), py::tuple(arguments(self).attr("values")())));
+  });
   using Recipe = py::typing::Tuple<py::object, py::typing::Tuple<py::object, py::ellipsis>>;
   c.def("__reduce__", [arguments](const py::object& self) -> Recipe {
     const auto partial = py::module_::import("functools").attr("partial");

@@ -46,11 +46,11 @@ void bind_servo(py::module_& m) {
       .def_property_readonly(
           "singular",
           [](const ServoStep& s) {
-            py::array_t<bool> out(s.singular_values.size());
+            py::array_t<bool> out(s.task_rows);
             for (py::ssize_t i = 0; i < out.size(); ++i) out.mutable_data()[i] = (s.singular >> i & 1u) != 0;
             return out;
           },
-          "Truth values: the rule does not treat direction i as regular.")
+          "(m',) truth values, one a row of the task: the rule does not treat direction i as regular.")
       .def("__repr__", [](const ServoStep& s) {
         return std::string("ServoStep(status=") + to_string(s.status) +
                ", qdot=" + py::str(to_numpy(s.qdot)).cast<std::string>() + ")";

@@ -180,11 +180,12 @@ Resolution resolve(const Method& method, const Spectrum& spectrum, const TaskVec
   Resolution out;
   const double enough = kExact * command.cwiseAbs().maxCoeff();  // a norm's squares overflow and vanish
   const Scene scene = survey(method, spectrum);
+  const std::array<double, kMaxTask> parts = spectrum.along_u(command);
 
   // Rows that no joint can move at all, of an m×n matrix with m > n.
   for (int i = size; i < m; ++i) {
     out.singular |= static_cast<std::uint8_t>(1u << i);
-    if (std::abs(spectrum.along_u(i, command)) > enough) out.exact = false;
+    if (std::abs(parts[static_cast<std::size_t>(i)]) > enough) out.exact = false;
   }
   if (scene.largest < kVanishing) {
     out.singular = static_cast<std::uint8_t>((1u << m) - 1u);
@@ -196,23 +197,21 @@ Resolution resolve(const Method& method, const Spectrum& spectrum, const TaskVec
       [&](const auto& rule) {
         using Rule = std::decay_t<decltype(rule)>;
         constexpr bool kSelective = std::is_same_v<Rule, SelectivelyDampedLeastSquares>;
-        TaskVector amplified;  // Kẋ
+        std::array<double, kMaxTask> amplified = parts;  // uᵢᵀKẋ
         if constexpr (std::is_same_v<Rule, JParse>) {
-          amplified = command;
-          for (int row = 0; row < m; ++row) {
-            amplified[row] *= (angular >> row & 1u) != 0 ? rule.gain_angular : rule.gain_linear;
+          if (rule.gain_linear != 1.0 || rule.gain_angular != 1.0) {
+            TaskVector product = command;
+            for (int row = 0; row < m; ++row) {
+              product[row] *= (angular >> row & 1u) != 0 ? rule.gain_angular : rule.gain_linear;
+            }
+            amplified = spectrum.along_u(product);
           }
         }
         for (int i = 0; i < size; ++i) {
           const double sigma = spectrum.sigma(i);
           const Direction direction = At{sigma, scene}(rule);
-          const double part = spectrum.along_u(i, command);
-          double asked = part;
-          if constexpr (std::is_same_v<Rule, JParse>) {
-            if (direction.gain_weight > 0.0) {
-              asked += direction.gain_weight * (spectrum.along_u(i, amplified) - part);
-            }
-          }
+          const double part = parts[static_cast<std::size_t>(i)];
+          const double asked = part + direction.gain_weight * (amplified[static_cast<std::size_t>(i)] - part);
           double speed = direction.inverse * asked;
           bool regular = direction.regular;
           if constexpr (kSelective) {

@@ -43,6 +43,11 @@ SIGMAIK_INLINE Vector<lanes> splat(double x) {
 SIGMAIK_INLINE double sum(Vector<2> x) { return x[0] + x[1]; }
 SIGMAIK_INLINE double sum(Vector<4> x) { return (x[0] + x[2]) + (x[1] + x[3]); }
 
+SIGMAIK_INLINE Vector<2> square_root(Vector<2> x) { return Vector<2>{__builtin_sqrt(x[0]), __builtin_sqrt(x[1])}; }
+SIGMAIK_INLINE Vector<4> square_root(Vector<4> x) {
+  return Vector<4>{__builtin_sqrt(x[0]), __builtin_sqrt(x[1]), __builtin_sqrt(x[2]), __builtin_sqrt(x[3])};
+}
+
 // One column, as vectors.
 template <int lanes, int length>
 struct Column {
@@ -191,11 +196,25 @@ SIGMAIK_INLINE int orthogonalise(JacobiWork<length>& work, int max_sweeps) {
           cosine[j] = 1.0 - tt * (0.5 - 0.375 * tt);
         }
       } else {
-#pragma GCC unroll 3
-        for (int j = 0; j < Order::width; ++j) {
-          const double denominator = __builtin_fabs(d[j]) + __builtin_sqrt(d[j] * d[j] + 4.0 * c[j] * c[j]) + 1e-300;
-          t[j] = __builtin_copysign(2.0, d[j]) * c[j] / denominator;  // tan of the smaller angle
-          cosine[j] = 1.0 / __builtin_sqrt(1.0 + t[j] * t[j]);
+#pragma GCC unroll 2
+        for (int first = 0; first < Order::width; first += lanes) {
+          auto cs = splat<lanes>(0.0), ds = splat<lanes>(1.0);
+#pragma GCC unroll 4
+          for (int i = 0; i < lanes; ++i) {
+            if (first + i >= Order::width) break;
+            cs[i] = c[first + i];
+            ds[i] = d[first + i];
+          }
+          const auto sign = ds < 0.0 ? splat<lanes>(-2.0) : splat<lanes>(2.0);
+          const auto magnitude = ds < 0.0 ? -ds : ds;
+          const auto ts = sign * cs / (magnitude + square_root(ds * ds + 4.0 * cs * cs) + 1e-300);
+          const auto cosines = 1.0 / square_root(1.0 + ts * ts);  // ts: tan of the smaller angle
+#pragma GCC unroll 4
+          for (int i = 0; i < lanes; ++i) {
+            if (first + i >= Order::width) break;
+            t[first + i] = ts[i];
+            cosine[first + i] = cosines[i];
+          }
         }
       }
 #pragma GCC unroll 3

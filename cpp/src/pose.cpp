@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "length.hpp"
+
 namespace sigmaik {
 
 Eigen::Vector3d rotation_log(const Eigen::Matrix3d& rotation) noexcept {
@@ -13,7 +15,7 @@ Eigen::Vector3d rotation_log(const Eigen::Matrix3d& rotation) noexcept {
     w = -w;
     x = -x;
   }
-  const double sine = std::hypot(x[0], x[1], x[2]);  // exact for the smallest, too
+  const double sine = detail::length(x);
   if (sine == 0.0) return Eigen::Vector3d::Zero();
   if (w < 1e-15) {  // a half turn: both signs of the axis are right
     for (int i = 0; i < 3; ++i) {
@@ -26,7 +28,7 @@ Eigen::Vector3d rotation_log(const Eigen::Matrix3d& rotation) noexcept {
 }
 
 Eigen::Matrix3d rotation_exp(const Eigen::Vector3d& vector) noexcept {
-  const double angle = std::hypot(vector[0], vector[1], vector[2]);
+  const double angle = detail::length(vector);
   if (angle == 0.0) return Eigen::Matrix3d::Identity();
   return Eigen::AngleAxisd(angle, vector / angle).toRotationMatrix();
 }

@@ -6,6 +6,7 @@
 
 #include <sigmaik/pose.hpp>
 
+#include "length.hpp"
 #include "message.hpp"
 
 namespace sigmaik {
@@ -32,7 +33,7 @@ void check_joints(const char* what, const JointRef& values, const Chain& chain) 
 }
 
 void shorten(Eigen::Ref<Eigen::Vector3d> vector, double longest) noexcept {
-  const double length = std::hypot(vector[0], vector[1], vector[2]);  // squares of far targets overflow
+  const double length = detail::length(vector);
   if (length > longest) vector *= longest / length;
 }
 
@@ -109,6 +110,7 @@ ServoStep Servo::resolve(const Twist& twist, bool fade) noexcept {
   step.status = solution.status;
   step.singular_values = solution.singular_values;
   step.singular = solution.singular;
+  step.task_rows = static_cast<int>(solution.directions.cols());
   step.qdot = solution.qdot;
 
   if (fade_ < 1.0) {
@@ -133,7 +135,7 @@ ServoStep Servo::resolve(const Twist& twist, bool fade) noexcept {
   }
 
   step.q = q_ + options_.dt * step.qdot;
-  step.achieved_twist = state_.jacobian * step.qdot;
+  step.achieved_twist = state_.jacobian.lazyProduct(step.qdot);
   if (!step.q.allFinite() || !step.achieved_twist.allFinite()) return hold(Status::BadInput);  // too large for numbers
   q_ = step.q;
   sigmaik::update(chain_, q_, state_);

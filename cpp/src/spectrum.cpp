@@ -94,8 +94,30 @@ void Spectrum::decompose(const TaskJacobianRef& jacobian) noexcept {
   }
 }
 
+// Products with whole, padded blocks, whose size the compiler knows: what lies beyond m, n and size() is zero.
+
+std::array<double, kMaxTask> Spectrum::along_u(const TaskVector& x) const noexcept {
+  Eigen::Matrix<double, kPaddedTask, 1> padded = Eigen::Matrix<double, kPaddedTask, 1>::Zero();
+  std::copy_n(x.data(), x.size(), padded.data());
+  std::array<double, kMaxTask> out;
+  Eigen::Map<Eigen::Matrix<double, kMaxTask, 1>>(out.data()) = u_.transpose().lazyProduct(padded);
+  return out;
+}
+
+std::array<double, kMaxTask> Spectrum::along_v(const JointRef& x) const noexcept {
+  std::array<double, kMaxTask> out;
+  Eigen::Map<Eigen::Matrix<double, kMaxTask, 1>> result(out.data());
+  Eigen::Matrix<double, kMaxJoints, 1> padded = Eigen::Matrix<double, kMaxJoints, 1>::Zero();
+  std::copy_n(x.data(), x.size(), padded.data());
+  if (n_ <= 8) {
+    result = v_.topRows<8>().transpose().lazyProduct(padded.head<8>());
+  } else {
+    result = v_.transpose().lazyProduct(padded);
+  }
+  return out;
+}
+
 JointVector Spectrum::combine_v(const std::array<double, kMaxTask>& x) const noexcept {
-  // Whole blocks: columns beyond size() and rows beyond n hold zeros, and x is zero beyond size().
   const Eigen::Map<const Eigen::Matrix<double, kMaxTask, 1>> factors(x.data());
   if (n_ <= 8) {
     const Eigen::Matrix<double, 8, 1> sum = v_.topRows<8>().lazyProduct(factors);

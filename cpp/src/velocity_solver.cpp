@@ -20,6 +20,27 @@ Solution refuse(const TaskJacobianRef& jacobian) noexcept {
   return s;
 }
 
+// x·0 is 0 for finite x only, and sums of it take a fraction of the tests that Eigen's allFinite() makes.
+template <typename Derived>
+bool finite(const Eigen::MatrixBase<Derived>& x) noexcept {
+  return (x.array() * 0.0).sum() == 0.0;
+}
+
+bool finite(const TaskJacobianRef& x) noexcept {
+  if (x.outerStride() != x.rows()) return x.allFinite();
+  return finite(Eigen::Map<const Eigen::VectorXd>(x.data(), x.size()));
+}
+
+// J q̇, column by column.
+TaskVector product(const TaskJacobianRef& jacobian, const JointVector& qdot) noexcept {
+  if (jacobian.rows() != 6) return jacobian.lazyProduct(qdot);
+  Twist sum = Twist::Zero();
+  for (Eigen::Index j = 0; j < jacobian.cols(); ++j) {
+    sum += qdot[j] * Eigen::Map<const Twist>(jacobian.data() + j * jacobian.outerStride());
+  }
+  return sum;
+}
+
 }  // namespace
 
 int Solution::singular_count() const noexcept { return std::popcount(singular); }
@@ -44,7 +65,7 @@ Solution VelocitySolver::solve(const TaskJacobianRef& jacobian, const TaskRef& t
   const bool select = m == 6 && !(asked == 6 && task_.frame == Frame::Base);
   if (m < 1 || m > kMaxTask || n < 1 || n > kMaxJoints || twist.size() != m ||
       (posture.size() != 0 && posture.size() != n) || (m != 6 && asked != 6 && m != asked) ||
-      !jacobian.allFinite() || !twist.allFinite() || !posture.allFinite() ||
+      !finite(jacobian) || !finite(twist) || !finite(posture) ||
       (select && task_.frame == Frame::Tool && !rotation.allFinite())) {
     return refuse(jacobian);
   }
@@ -84,16 +105,14 @@ Solution VelocitySolver::solve(const TaskJacobianRef& jacobian, const TaskRef& t
   double enough = command.cwiseAbs().maxCoeff();  // what the answer may miss of the command and be exact, times 1e9
   if (posture.size() != 0) {
     enough = std::max(enough, spectrum_.sigma(0) * posture.cwiseAbs().maxCoeff());
-    for (std::size_t i = 0; i < static_cast<std::size_t>(spectrum_.size()); ++i) {
-      const double along = spectrum_.along_v(static_cast<int>(i), posture);
-      resolution.speed[i] -= resolution.projector[i] * along;
-    }
+    const std::array<double, kMaxTask> along = spectrum_.along_v(posture);
+    for (std::size_t i = 0; i < along.size(); ++i) resolution.speed[i] -= resolution.projector[i] * along[i];
     s.qdot = posture + spectrum_.combine_v(resolution.speed);
   } else {
     s.qdot = spectrum_.combine_v(resolution.speed);
   }
-  s.achieved_twist = jacobian.lazyProduct(s.qdot);
-  if (!s.qdot.allFinite() || !s.achieved_twist.allFinite() || !std::isfinite(spectrum_.sigma(0))) {
+  s.achieved_twist = product(jacobian, s.qdot);
+  if (!finite(s.qdot) || !finite(s.achieved_twist) || !std::isfinite(spectrum_.sigma(0))) {
     return refuse(jacobian);  // too large for numbers
   }
 
@@ -110,8 +129,12 @@ Solution VelocitySolver::solve(const TaskJacobianRef& jacobian, const TaskRef& t
   s.singular = resolution.singular;
   s.singular_values.resize(spectrum_.size());
   for (int i = 0; i < spectrum_.size(); ++i) s.singular_values[i] = spectrum_.sigma(i);
-  s.directions.resize(spectrum_.rows(), spectrum_.rows());
-  for (int i = 0; i < spectrum_.rows(); ++i) s.directions.col(i) = spectrum_.u(i);
+  if (m == 6 && !select) {
+    s.directions = spectrum_.basis<6>();
+  } else {
+    s.directions.resize(spectrum_.rows(), spectrum_.rows());
+    for (int i = 0; i < spectrum_.rows(); ++i) s.directions.col(i) = spectrum_.u(i);
+  }
   return s;
 }
 

@@ -361,7 +361,7 @@ TEST_CASE("a mask and a Jacobian whose rows do not fit are refused") {
   VelocitySolver tool(JParse{}, 1.0, task);
   Eigen::Matrix3d rotation = random.rotation();
   rotation(1, 1) = kNan;
-  CHECK(tool.solve(random.matrix(6, 7), random.vector(6), {}, rotation).status == Status::BadInput);
+  CHECK(tool.solve(random.matrix(6, 7), random.vector(6), JointVector(), rotation).status == Status::BadInput);
 }
 
 TEST_CASE("huge and tiny numbers: finite or refused, and no trace afterwards") {
@@ -482,7 +482,7 @@ TEST_CASE("decompose(), solve(), update() and jacobian_gradient() leave the heap
         const VectorXd twist = random.vector(6);
         const Eigen::Matrix3d rotation = random.rotation();
         const test::HeapWatch watch;
-        const Solution s = solver.solve(j, twist, {}, rotation);
+        const Solution s = solver.solve(j, twist, JointVector(), rotation);
         CHECK(watch.calls() == 0);
         CHECK(s.status != Status::BadInput);
       }

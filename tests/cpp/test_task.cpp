@@ -89,7 +89,7 @@ TEST_CASE("a solver with a task: as masked by hand, and as given masked already"
     const sigmaik::JParse method{0.2, random.uniform(0.0, 3.0), random.uniform(0.0, 3.0), random.chance(0.5)};
 
     sigmaik::VelocitySolver solver(method, length_scale, task);
-    const sigmaik::Solution s = solver.solve(j, twist, {}, rotation);
+    const sigmaik::Solution s = solver.solve(j, twist, sigmaik::JointVector(), rotation);
     REQUIRE(s.status != sigmaik::Status::BadInput);
     CHECK(s.directions.rows() == task.rows());
     CHECK(s.singular_values.size() == std::min(task.rows(), n));
@@ -133,7 +133,7 @@ TEST_CASE("a solver with a task: as masked by hand, and as given masked already"
     sigmaik::VelocitySolver plain(sigmaik::JParse{method.gamma, 1.0, 1.0, true});
     sigmaik::VelocitySolver with_task(plain.method(), length_scale, task);
     const sigmaik::Solution p = plain.solve(masked, command);
-    const sigmaik::Solution q = with_task.solve(j, twist, {}, rotation);
+    const sigmaik::Solution q = with_task.solve(j, twist, sigmaik::JointVector(), rotation);
     CHECK((p.qdot - q.qdot).norm() < 1e-10 * bound);
   }
 }
@@ -164,10 +164,10 @@ TEST_CASE("free rotation about the tool's axis: the tool axis is kept whatever t
     const Eigen::Matrix3d rotation = random.rotation();
     sigmaik::VelocitySolver solver(sigmaik::PseudoInverse{}, 1.0, task);
     const VectorXd twist = random.vector(6);
-    const sigmaik::Solution a = solver.solve(j, twist, {}, rotation);
+    const sigmaik::Solution a = solver.solve(j, twist, sigmaik::JointVector(), rotation);
     const Eigen::Matrix3d spun = rotation * Eigen::AngleAxisd(random.uniform(-3, 3), Eigen::Vector3d::UnitZ());
     solver.reset();
-    const sigmaik::Solution b = solver.solve(j, twist, {}, spun);
+    const sigmaik::Solution b = solver.solve(j, twist, sigmaik::JointVector(), spun);
     CHECK((a.qdot - b.qdot).norm() < 1e-11 * (1.0 + a.qdot.norm()));
     const Eigen::Vector3d axis = rotation.col(2);
     const Eigen::Vector3d omega = a.achieved_twist.tail(3), asked = twist.tail(3);

@@ -47,6 +47,7 @@ struct ServoStep {
   std::uint16_t limiting_joints = 0;  ///< bit i: joint i's limit determines `scale`
   TaskVector singular_values;        ///< of the weighted task Jacobian
   std::uint8_t singular = 0;         ///< bit i: direction i is singular to the rule
+  int task_rows = 0;                 ///< m', the number of directions
 };
 
 /// Drives a chain's own reference configuration towards poses, or along twists. It integrates the command that it

@@ -31,12 +31,17 @@ class Spectrum {
   double sigma(int i) const noexcept { return sigma_[static_cast<std::size_t>(i)]; }
   /// u_i (m,), i < m: an orthonormal basis of the task's rows.
   auto u(int i) const noexcept { return u_.col(i).head(m_); }
+  /// u_0 … as columns, for rows() == kRows known when compiling.
+  template <int kRows>
+  auto basis() const noexcept {
+    return u_.template topLeftCorner<kRows, kRows>();
+  }
   /// v_i (n,), i < size(): orthonormal directions of the joints.
   auto v(int i) const noexcept { return v_.col(i).head(n_); }
-  /// u_iᵀ x for x (m,).
-  double along_u(int i, const TaskVector& x) const noexcept { return u(i).dot(x); }
-  /// v_iᵀ x for x (n,).
-  double along_v(int i, const JointVector& x) const noexcept { return v(i).dot(x); }
+  /// u_iᵀ x for x (m,), i < m; 0 beyond.
+  std::array<double, kMaxTask> along_u(const TaskVector& x) const noexcept;
+  /// v_iᵀ x for x (n,), i < size(); 0 beyond.
+  std::array<double, kMaxTask> along_v(const JointRef& x) const noexcept;
   /// Σ x_i v_i (n,), over i < size().
   JointVector combine_v(const std::array<double, kMaxTask>& x) const noexcept;
   /// Sweeps that the last call took.

@@ -1,0 +1,402 @@
+"""The servo from Python: arms that reach, limits that hold, arguments that are refused. tests/cpp/test_servo.cpp has more."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import sigmaik as sk
+
+ARMS = sk.robots.names()
+METHODS = [
+    sk.PseudoInverse(),
+    sk.DampedLeastSquares(),
+    sk.AdaptiveDampedLeastSquares(),
+    sk.SelectivelyDampedLeastSquares(),
+    sk.JParse(),
+    sk.JParse(0.1, 2.0, 2.0, continuous=False),
+    sk.JacobianProjection(),
+    sk.JacobianSafety(),
+    sk.JacobianSafetyProjection(),
+]
+
+
+@pytest.fixture(params=ARMS)
+def arm(request):
+    return sk.robots.load(request.param), sk.robots.home(request.param)
+
+
+def offset(pose, translation=(0, 0, 0), rotvec=(0, 0, 0)):
+    out = pose.copy()
+    out[:3, 3] += translation
+    out[:3, :3] = Rotation.from_rotvec(rotvec).as_matrix() @ out[:3, :3]
+    return out
+
+
+def check_step(step, chain, before, dt):
+    assert np.all(np.abs(step.qdot) <= chain.limits.velocity)
+    np.testing.assert_array_equal(step.q, before + dt * step.qdot)
+    assert 0 <= step.scale <= 1
+    assert (step.scale < 1) == bool(step.limiting_joints) == (step.status == sk.Status.LIMITED)
+
+
+def test_from_home_to_around_home(arm):
+    chain, home = arm
+    rng = np.random.default_rng(1)
+    for _ in range(3):
+        dt = 0.005
+        servo = sk.Servo(chain, sk.JParse(), dt=dt)
+        servo.reset(home)
+        target = chain.pose(home + rng.uniform(-0.2, 0.2, chain.dof))
+        before = home
+        for _ in range(1500):
+            step = servo.update(target)
+            check_step(step, chain, before, dt)
+            before = step.q
+        np.testing.assert_allclose(servo.pose, target, atol=1e-6)
+        np.testing.assert_allclose(servo.pose, chain.pose(step.q), atol=1e-14)
+        np.testing.assert_array_equal(servo.q, step.q)
+
+
+def test_pose_error_is_scipys(arm):
+    chain, home = arm
+    rng = np.random.default_rng(2)
+    for _ in range(50):
+        servo = sk.Servo(chain, sk.JParse())
+        q = home + rng.normal(size=chain.dof)
+        servo.reset(q)
+        translation, rotvec = rng.normal(size=3), rng.normal(size=3)
+        rotvec *= rng.uniform(0, 3.1) / np.linalg.norm(rotvec)
+        step = servo.update(offset(chain.pose(q), translation, rotvec))
+        np.testing.assert_allclose(step.pose_error, [*translation, *rotvec], rtol=0, atol=1e-12)
+
+
+def test_scaling_keeps_the_direction(arm):
+    chain, home = arm
+    rng = np.random.default_rng(3)
+    slow = chain.with_limits(velocity=rng.uniform(0.05, 0.5, chain.dof))
+    limited = 0
+    for method in METHODS:
+        for _ in range(10):
+            free = sk.Servo(slow, method, velocity_limits=False)
+            held = sk.Servo(slow, method)
+            for servo in (free, held):
+                servo.reset(home)
+            twist = rng.normal(size=6)
+            asked, step = free.update_twist(twist), held.update_twist(twist)
+            assert asked.scale == 1
+            assert asked.limiting_joints == ()
+            check_step(step, slow, home, 1e-3)
+            np.testing.assert_allclose(step.qdot, step.scale * asked.qdot, rtol=1e-12, atol=1e-15)
+            ratio = np.abs(asked.qdot) / slow.limits.velocity
+            if ratio.max() > 1:
+                limited += 1
+                assert step.scale == pytest.approx(1 / ratio.max())
+                assert step.limiting_joints == tuple(np.flatnonzero(ratio > ratio.max() * (1 - 1e-12)))
+            else:
+                np.testing.assert_array_equal(step.qdot, asked.qdot)
+    assert limited > 50
+
+
+def test_no_kick_at_the_start(arm):
+    chain, home = arm
+    for method in METHODS:
+        servo = sk.Servo(chain, method, posture_gain=5.0)
+        servo.reset(home)
+        for _ in range(20):
+            step = servo.update(chain.pose(home))
+            np.testing.assert_allclose(step.qdot, 0, atol=1e-12)
+        servo = sk.Servo(chain, method)
+        servo.reset(home)
+        first = servo.update(offset(chain.pose(home), (0.3, 0.2, -0.3), (1, 1, 1)))
+        hard = sk.Servo(chain, method, soft_start=0.0, velocity_limits=False)
+        hard.reset(home)
+        full = hard.update(offset(chain.pose(home), (0.3, 0.2, -0.3), (1, 1, 1)))
+        assert np.linalg.norm(first.qdot) <= 0.0101 * np.linalg.norm(full.qdot)
+
+
+def test_from_an_exact_singularity(arm):
+    """At q = 0, in all twelve directions: what the arm can do it does, what it cannot it calls damped."""
+    chain, _ = arm
+    zero = np.zeros(chain.dof)
+    U, sigma, _ = np.linalg.svd(chain.jacobian(zero))
+    can = U[:, sigma > 1e-9 * sigma[0]]
+    for axis in range(6):
+        for sign in (1, -1):
+            direction = sign * np.eye(6)[axis]
+            servo = sk.Servo(chain, sk.JParse())
+            servo.reset(zero)
+            progress, statuses = 0.0, set()
+            for _ in range(50):
+                step = servo.update_twist(0.05 * direction)
+                progress += 1e-3 * direction @ step.achieved_twist
+                statuses.add(step.status)
+            if np.linalg.norm(can.T @ direction) > 1e-3:
+                assert progress > 1e-8
+            else:
+                assert statuses == {sk.Status.DAMPED}
+                np.testing.assert_allclose(servo.q, 0, atol=1e-9)
+
+
+def test_it_leaves_the_singularity_that_it_started_in(arm):
+    """From q = 0 to a pose well inside the workspace."""
+    chain, home = arm
+    target = chain.pose(home)
+    servo = sk.Servo(chain, sk.JParse(), dt=0.01)
+    servo.reset(np.zeros(chain.dof))
+    errors = []
+    for _ in range(6000):
+        errors.append(np.linalg.norm(servo.update(target).pose_error))
+    assert np.isfinite(errors).all()
+    assert errors[-1] < errors[0]
+    assert np.all(np.diff(errors[50:]) < 2e-2)
+
+
+@pytest.mark.parametrize("method", METHODS, ids=repr)
+def test_targets_that_jump_and_are_out_of_reach(method):
+    chain = sk.robots.load("ufactory_xarm7")
+    rng = np.random.default_rng(4)
+    servo = sk.Servo(chain, method, dt=0.02)
+    before = sk.robots.home("ufactory_xarm7")
+    servo.reset(before)
+    for cycle in range(2000):
+        if cycle % 100 == 0:
+            target = chain.pose(chain.random_configuration(rng))
+            target[:3, 3] *= rng.choice([1, 1, 3, 1e6])
+        step = servo.update(target)
+        check_step(step, chain, before, 0.02)
+        assert np.all(np.isfinite(step.pose_error))
+        before = step.q
+
+
+def test_out_of_reach_and_back():
+    """The xArm7's line: out, stretched and still, and back to within a micrometre."""
+    chain, home = sk.robots.load("ufactory_xarm7"), sk.robots.home("ufactory_xarm7")
+    servo = sk.Servo(chain, sk.JParse(), dt=0.01)
+    servo.reset(home)
+    start = servo.pose
+    for _ in range(2000):
+        step = servo.update(offset(start, (3, 0, 0)))
+    assert step.status == sk.Status.DAMPED
+    assert step.singular.any()
+    assert step.singular_values[-1] < 0.05 * step.singular_values[0]
+    assert np.linalg.norm(step.qdot) < 0.05
+    for _ in range(3000):
+        step = servo.update(start)
+    np.testing.assert_allclose(step.pose_error, 0, atol=1e-6)
+
+
+def test_posture_is_pinned_where_the_arm_started_or_as_given():
+    chain, home = sk.robots.load("franka_panda"), sk.robots.home("franka_panda")
+    rng = np.random.default_rng(5)
+    given = home + rng.uniform(-0.2, 0.2, 7)
+    for posture in (None, given):
+        servo = sk.Servo(chain, sk.JParse(), dt=0.01, posture=posture, posture_gain=2.0)
+        servo.reset(home)
+        target = chain.pose(home)
+        for _ in range(1500):
+            servo.update(target)
+        np.testing.assert_allclose(servo.pose, target, atol=1e-6)
+        away = (home if posture is None else given) - servo.q
+        # At rest the posture pulls along nothing that the task leaves free.
+        null = np.linalg.svd(chain.jacobian(servo.q))[2][6:]
+        np.testing.assert_allclose(null @ away, 0, atol=1e-6)
+    with pytest.raises(sk.Error, match="posture"):
+        sk.Servo(chain, sk.JParse(), posture=np.zeros(6))
+
+
+def test_only_some_rows():
+    chain, home = sk.robots.load("ur10"), sk.robots.home("ur10")
+    target = offset(chain.pose(home), (0.1, 0.05, -0.1), (0.4, -0.3, 0.5))
+    servo = sk.Servo(chain, sk.JParse(), dt=0.01, mask=[1, 1, 1, 0, 0, 0])
+    servo.reset(home)
+    for _ in range(1500):
+        step = servo.update(target)
+    np.testing.assert_allclose(step.pose_error[:3], 0, atol=1e-8)
+    assert np.linalg.norm(step.pose_error[3:]) > 0.1
+    assert step.singular.shape == step.singular_values.shape == (3,)
+
+    # Free rotation about the tool's z axis: the axis itself arrives.
+    servo = sk.Servo(chain, sk.JParse(), dt=0.01, mask=[1, 1, 1, 1, 1, 0], frame="tool")
+    servo.reset(home)
+    for _ in range(2500):
+        step = servo.update(target)
+    np.testing.assert_allclose(step.pose_error[:3], 0, atol=1e-6)
+    np.testing.assert_allclose(servo.pose[:3, 2], target[:3, 2], atol=1e-6)
+
+
+class Homogeneous:
+    def __init__(self, matrix):
+        self.homogeneous = matrix
+
+
+class AsMatrix:
+    def __init__(self, matrix):
+        self.matrix = matrix
+
+    def as_matrix(self):
+        return self.matrix
+
+
+class Spatialmath:
+    def __init__(self, matrix):
+        self.A = matrix
+
+
+def test_poses_of_other_libraries():
+    chain, home = sk.robots.load("ur10"), sk.robots.home("ur10")
+    target = offset(chain.pose(home), (0.1, 0, 0))
+
+    def first(pose):
+        servo = sk.Servo(chain, sk.JParse())
+        servo.reset(home)
+        return servo.update(pose).qdot
+
+    expected = first(target)
+    for same in (Homogeneous(target), AsMatrix(target), Spatialmath(target), target.tolist(), np.asfortranarray(target)):
+        np.testing.assert_array_equal(first(same), expected)
+    np.testing.assert_allclose(first(target.astype(np.float32)), expected, rtol=1e-4, atol=1e-6)
+
+
+NOT_POSES = [
+    np.full((4, 4), np.nan),
+    np.zeros((4, 4)),
+    2 * np.eye(4),
+    np.diag([1, 1, -1, 1]),
+    np.diag([1, 1, 1, 2]),
+    np.eye(4) + 1e-3 * np.eye(4, k=1),
+    np.eye(3),
+    np.eye(4)[None],
+    np.zeros(7),
+    None,
+    "pose",
+    1.0,
+    np.eye(4, dtype=complex),
+]
+
+
+@pytest.mark.parametrize("wrong", NOT_POSES, ids=repr)
+def test_what_is_not_a_pose_is_refused_and_leaves_no_trace(wrong):
+    chain, home = sk.robots.load("ur10"), sk.robots.home("ur10")
+    target = offset(chain.pose(home), (0.1, 0, 0))
+    servo, untouched = sk.Servo(chain, sk.JParse()), sk.Servo(chain, sk.JParse())
+    servo.reset(home)
+    untouched.reset(home)
+    for _ in range(10):
+        with pytest.raises(sk.Error, match="target"):
+            servo.update(wrong)
+        np.testing.assert_array_equal(servo.q, untouched.q)
+        np.testing.assert_array_equal(servo.update(target).qdot, untouched.update(target).qdot)
+
+
+@pytest.mark.parametrize("wrong", [np.full(6, np.nan), [0, 0, 0, 0, 0, np.inf], np.zeros(7), np.zeros((6, 1)), None, "x", 0.0])
+def test_what_is_not_a_twist_is_refused(wrong):
+    servo = sk.Servo(sk.robots.load("ur10"), sk.JParse())
+    servo.reset(sk.robots.home("ur10"))
+    q = servo.q
+    with pytest.raises(sk.Error, match="twist"):
+        servo.update_twist(wrong)
+    np.testing.assert_array_equal(servo.q, q)
+
+
+def test_before_reset():
+    servo = sk.Servo(sk.robots.load("ur10"), sk.JParse())
+    for call in (lambda: servo.update(np.eye(4)), lambda: servo.update_twist(np.zeros(6)), lambda: servo.q, lambda: servo.pose):
+        with pytest.raises(sk.Error, match="reset"):
+            call()
+
+
+@pytest.mark.parametrize("n", [0, 1, 5, 7, 16, 17, 20, 10_000])
+def test_reset_with_a_wrong_size(n):
+    servo = sk.Servo(sk.robots.load("ur10"), sk.JParse())
+    with pytest.raises(sk.Error, match="q has shape"):
+        servo.reset(np.zeros(n))
+    servo.reset(np.zeros(6))
+    with pytest.raises(sk.Error, match="qdot has shape"):
+        servo.reset(np.zeros(6), np.zeros(n))
+
+
+def test_reset_with_what_is_not_finite():
+    servo = sk.Servo(sk.robots.load("ur10"), sk.JParse())
+    servo.reset(sk.robots.home("ur10"))
+    with pytest.raises(sk.Error, match=r"q\[2\]"):
+        servo.reset([0, 0, np.nan, 0, 0, 0])
+    np.testing.assert_array_equal(servo.q, sk.robots.home("ur10"))
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"dt": 0.0},
+        {"dt": -1e-3},
+        {"dt": np.nan},
+        {"dt": np.inf},
+        {"gain_linear": -1.0},
+        {"gain_angular": np.nan},
+        {"gain_linear": np.inf},
+        {"max_linear_error": 0.0},
+        {"max_angular_error": -1.0},
+        {"max_angular_error": np.nan},
+        {"soft_start": -0.1},
+        {"soft_start": np.inf},
+        {"posture_gain": -1.0},
+        {"posture_max_speed": 0.0},
+        {"length_scale": 0.0},
+        {"length_scale": np.nan},
+        {"on_limit": "ignore"},
+        {"mask": [0] * 6},
+        {"mask": [1] * 7},
+        {"frame": "world"},
+        {"posture": np.zeros(20)},
+        {"posture": [np.nan] * 6},
+    ],
+    ids=repr,
+)
+def test_options_out_of_their_range(options):
+    with pytest.raises(sk.Error, match=next(iter(options))):
+        sk.Servo(sk.robots.load("ur10"), sk.JParse(), **options)
+
+
+def test_beyond_numbers():
+    chain, home = sk.robots.load("ur10"), sk.robots.home("ur10")
+    servo = sk.Servo(chain, sk.JParse(), dt=1e10, velocity_limits=False)
+    servo.reset(home)
+    with pytest.raises(sk.Error, match="too large"):
+        servo.update_twist(np.full(6, 1e300))
+    np.testing.assert_array_equal(servo.q, home)
+
+
+def test_what_can_be_asked_of_a_servo():
+    chain = sk.robots.load("ur10")
+    servo = sk.Servo(chain, sk.JParse(0.2), 0.002)
+    assert servo.dt == 0.002
+    assert servo.chain.joint_names == chain.joint_names
+    assert servo.method == sk.JParse(0.2)
+    servo.method = sk.DampedLeastSquares()
+    assert servo.method == sk.DampedLeastSquares()
+    servo.reset(sk.robots.home("ur10"))
+    step = servo.update_twist([0.1, 0, 0, 0, 0, 0])
+    assert step.status == sk.Status.DAMPED
+    assert "damped" in repr(step)
+    with pytest.raises(TypeError):
+        servo.method = None
+    with pytest.raises(AttributeError):
+        servo.dt = 1.0
+    with pytest.raises(AttributeError):
+        step.q = np.zeros(6)
+
+
+def test_an_arm_of_few_joints_says_which_directions_it_has_not():
+    """Two joints, six rows: four directions that nothing can move are singular, too."""
+    urdf = """<robot name="two"><link name="a"/><link name="b"/><link name="c"/><link name="d"/>
+      <joint name="j1" type="continuous"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/></joint>
+      <joint name="j2" type="continuous"><parent link="b"/><child link="c"/><origin xyz="1 0 0"/><axis xyz="0 0 1"/></joint>
+      <joint name="tool" type="fixed"><parent link="c"/><child link="d"/><origin xyz="1 0 0"/></joint></robot>"""
+    chain = sk.Chain.from_urdf(urdf)
+    servo = sk.Servo(chain, sk.JParse())
+    servo.reset([0.3, 0.7])
+    step = servo.update_twist([0, 0, 0.1, 0, 0, 0])
+    assert step.status == sk.Status.DAMPED
+    np.testing.assert_allclose(step.qdot, 0, atol=1e-12)
+    solution = sk.VelocitySolver(sk.JParse()).solve(chain.jacobian([0.3, 0.7]), [0, 0, 0.1, 0, 0, 0])
+    assert solution.singular.sum() == 4
+    np.testing.assert_array_equal(step.singular, solution.singular)
