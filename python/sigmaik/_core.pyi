@@ -455,7 +455,7 @@ class ServoStep:
     @property
     def singular(self) -> numpy.typing.NDArray[numpy.bool]:
         """
-        Truth values: the rule does not treat direction i as regular.
+        (m',) truth values, one a row of the task: the rule does not treat direction i as regular.
         """
     @property
     def singular_values(self) -> numpy.typing.NDArray[numpy.float64]:
