@@ -38,8 +38,8 @@ void solve_batch(const Method& method, double length_scale, const BatchShape& sh
     }
   };
 
-  // More threads than cores gain nothing.
-  const unsigned cores = std::max(1u, std::thread::hardware_concurrency());
+  // More threads than cores gain nothing. The question costs microseconds.
+  const unsigned cores = threads == 1 ? 1u : std::max(1u, std::thread::hardware_concurrency());
   const std::size_t workers = std::min({static_cast<std::size_t>(threads), shape.count, std::size_t{cores}});
   if (workers <= 1) return work(0, shape.count);
   std::vector<std::thread> pool;

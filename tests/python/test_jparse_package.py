@@ -1,6 +1,7 @@
 """Against the J-PARSE authors' own package (PyPI: jparse-robotics), wherever it is defined.
 
-Its JParseCore computes J_s⁺ J_p J_p⁺ + J_s⁺ U_s Φ U_sᵀ K: K weighs the command's rows, as it does here. It is not defined
+Its JParseCore computes J_s⁺ J_p J_p⁺ + J_s⁺ U_s Φ U_sᵀ K: K weighs the command's rows, as here.
+It is not defined
 
 - where a direction that it drops survives in the rounding of its products: numpy's pinv then inverts it;
 - for γ = 1, which it refuses;
@@ -27,7 +28,9 @@ def random_jacobian(rng, m, n, gamma):
     """Some singular values below the threshold, some at it, some repeated, some all but zero."""
     sigma = np.array(
         [
-            [rng.uniform(0.02, 1), gamma * (1 + rng.choice([-1, 1]) * 1e-3), 10 ** rng.uniform(-9, -1), 0.7][rng.integers(4)]
+            [rng.uniform(0.02, 1), gamma * (1 + rng.choice([-1, 1]) * 1e-3), 10 ** rng.uniform(-9, -1), 0.7][
+                rng.integers(4)
+            ]
             for _ in range(m)
         ]
     )
@@ -63,7 +66,9 @@ def test_qdot_and_null_space():
         for continuous in (True, False):  # the same thing for unit gains
             solver = sk.VelocitySolver(sk.JParse(gamma, continuous=continuous))
             qdot = solver.solve(J, twist).qdot
-            np.testing.assert_allclose(qdot, matrix @ twist, rtol=0, atol=1e-9 * scale * np.linalg.norm(twist))
+            np.testing.assert_allclose(
+                qdot, matrix @ twist, rtol=0, atol=1e-9 * scale * np.linalg.norm(twist)
+            )
             if np.linalg.cond(J) < 1e6:
                 rest = solver.solve(J, twist, posture).qdot - qdot
                 np.testing.assert_allclose(rest, null_space @ posture, rtol=0, atol=1e-8)
@@ -87,7 +92,7 @@ def test_gains_of_linear_and_angular_rows():
         twist = rng.normal(size=6)
         qdot = sk.VelocitySolver(sk.JParse(gamma, linear, angular, continuous=False)).solve(J, twist).qdot
         sigma = np.linalg.svd(J, compute_uv=False)
-        # K weighs some directions and not others: where two on either side of the threshold are close, they mix.
+        # Singular directions are weighed, the others are not: close by the threshold they mix.
         scale = max(1, linear, angular) / (gamma * sigma[0])
         np.testing.assert_allclose(qdot, matrix @ twist, rtol=0, atol=1e-9 * scale * np.linalg.norm(twist))
         compared += 1

@@ -1,4 +1,7 @@
-"""The servo from Python: arms that reach, limits that hold, arguments that are refused. tests/cpp/test_servo.cpp has more."""
+"""The servo from Python: arms that reach, limits that hold, arguments that are refused.
+
+tests/cpp/test_servo.cpp has more.
+"""
 
 import numpy as np
 import pytest
@@ -252,7 +255,13 @@ def test_poses_of_other_libraries():
         return servo.update(pose).qdot
 
     expected = first(target)
-    for same in (Homogeneous(target), AsMatrix(target), Spatialmath(target), target.tolist(), np.asfortranarray(target)):
+    for same in (
+        Homogeneous(target),
+        AsMatrix(target),
+        Spatialmath(target),
+        target.tolist(),
+        np.asfortranarray(target),
+    ):
         np.testing.assert_array_equal(first(same), expected)
     np.testing.assert_allclose(first(target.astype(np.float32)), expected, rtol=1e-4, atol=1e-6)
 
@@ -288,7 +297,9 @@ def test_what_is_not_a_pose_is_refused_and_leaves_no_trace(wrong):
         np.testing.assert_array_equal(servo.update(target).qdot, untouched.update(target).qdot)
 
 
-@pytest.mark.parametrize("wrong", [np.full(6, np.nan), [0, 0, 0, 0, 0, np.inf], np.zeros(7), np.zeros((6, 1)), None, "x", 0.0])
+@pytest.mark.parametrize(
+    "wrong", [np.full(6, np.nan), [0, 0, 0, 0, 0, np.inf], np.zeros(7), np.zeros((6, 1)), None, "x", 0.0]
+)
 def test_what_is_not_a_twist_is_refused(wrong):
     servo = sk.Servo(sk.robots.load("ur10"), sk.JParse())
     servo.reset(sk.robots.home("ur10"))
@@ -300,7 +311,12 @@ def test_what_is_not_a_twist_is_refused(wrong):
 
 def test_before_reset():
     servo = sk.Servo(sk.robots.load("ur10"), sk.JParse())
-    for call in (lambda: servo.update(np.eye(4)), lambda: servo.update_twist(np.zeros(6)), lambda: servo.q, lambda: servo.pose):
+    for call in (
+        lambda: servo.update(np.eye(4)),
+        lambda: servo.update_twist(np.zeros(6)),
+        lambda: servo.q,
+        lambda: servo.pose,
+    ):
         with pytest.raises(sk.Error, match="reset"):
             call()
 
@@ -389,8 +405,9 @@ def test_an_arm_of_few_joints_says_which_directions_it_has_not():
     """Two joints, six rows: four directions that nothing can move are singular, too."""
     urdf = """<robot name="two"><link name="a"/><link name="b"/><link name="c"/><link name="d"/>
       <joint name="j1" type="continuous"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/></joint>
-      <joint name="j2" type="continuous"><parent link="b"/><child link="c"/><origin xyz="1 0 0"/><axis xyz="0 0 1"/></joint>
-      <joint name="tool" type="fixed"><parent link="c"/><child link="d"/><origin xyz="1 0 0"/></joint></robot>"""
+      <joint name="j2" type="continuous"><parent link="b"/><child link="c"/>
+        <origin xyz="1 0 0"/><axis xyz="0 0 1"/></joint>
+      <joint name="t" type="fixed"><parent link="c"/><child link="d"/><origin xyz="1 0 0"/></joint></robot>"""
     chain = sk.Chain.from_urdf(urdf)
     servo = sk.Servo(chain, sk.JParse())
     servo.reset([0.3, 0.7])
