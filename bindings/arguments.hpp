@@ -83,6 +83,7 @@ void bind_chain(py::module_& m);
 void bind_methods(py::module_& m);
 void bind_solver(py::module_& m);
 void bind_servo(py::module_& m);
+void bind_dynamics(py::module_& m);
 
 }  // namespace sigmaik::bindings
 

@@ -50,4 +50,5 @@ PYBIND11_MODULE(_core, m) {
   bind_methods(m);
   bind_solver(m);
   bind_servo(m);
+  bind_dynamics(m);
 }

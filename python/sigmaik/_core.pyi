@@ -6,7 +6,7 @@ import enum
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['AdaptiveDampedLeastSquares', 'Chain', 'DampedLeastSquares', 'Error', 'JParse', 'JacobianProjection', 'JacobianSafety', 'JacobianSafetyProjection', 'JointLimits', 'PseudoInverse', 'SelectivelyDampedLeastSquares', 'Servo', 'ServoStep', 'Solution', 'Spectrum', 'Status', 'VelocitySolver', 'pose_error', 'rotation_exp', 'rotation_log', 'solve_batch']
+__all__: list[str] = ['AdaptiveDampedLeastSquares', 'Chain', 'DampedLeastSquares', 'Dynamics', 'Error', 'JParse', 'JacobianProjection', 'JacobianSafety', 'JacobianSafetyProjection', 'JointLimits', 'PseudoInverse', 'SelectivelyDampedLeastSquares', 'Servo', 'ServoStep', 'Solution', 'Spectrum', 'Status', 'VelocitySolver', 'pose_error', 'rotation_exp', 'rotation_log', 'solve_batch']
 class Error(ValueError):
     """
     What set-up and checked calls refuse. The text carries the facts.
@@ -526,6 +526,28 @@ class Servo:
     def q(self) -> numpy.typing.NDArray[numpy.float64]:
         """
         (n,) where the reference stands.
+        """
+class Dynamics:
+    """
+    Rigid-body dynamics M(q) q̈ + C(q, q̇) q̇ + g(q) = τ of a chain, by KDL's ChainDynParam.
+    """
+    def __init__(self, chain: Chain, gravity: numpy.typing.ArrayLike | None = None) -> None:
+        """
+        gravity: (3,) [m/s²] in base axes; by default 9.80665 m/s² along −z.
+
+        Raises Error where a movable joint carries no link whose inertia is known.
+        """
+    def coriolis(self, q: numpy.typing.ArrayLike, qdot: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        C(q, q̇) q̇ (n,) [N·m] at q and q̇ (n,).
+        """
+    def gravity(self, q: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        g (n,) [N·m] at q (n,): the torques that hold the arm.
+        """
+    def mass_matrix(self, q: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        M (n, n) [kg·m²] at q (n,).
         """
 def pose_error(current: typing.Any, target: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
     """

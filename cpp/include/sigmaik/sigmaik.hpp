@@ -15,6 +15,7 @@
 ///     velocity_solver.hpp  VelocitySolver: rule and posture → Solution
 ///     batch.hpp            solve_batch: many at once
 ///     servo.hpp            Servo: pose or twist in, joint command out, each cycle
+///     dynamics.hpp         Dynamics: mass matrix, Coriolis, gravity, by KDL; not real time (not included)
 ///
 /// Set-up throws Error. Calls marked "real time" are noexcept, bounded, and touch neither heap nor lock.
 
