@@ -173,6 +173,54 @@ TEST_CASE("velocity limits: kept without tolerance, by scaling, and the joints n
   CHECK(limited > 3000);
 }
 
+TEST_CASE("one cycle, by the formula: gains, caps, posture and weights") {
+  Random random(24);
+  for (const auto& [name, chain] : arms()) {
+    for (int repeat = 0; repeat < 40; ++repeat) {
+      CAPTURE(name);
+      ServoOptions options;
+      options.soft_start = 0.0;
+      options.velocity_limits = false;
+      options.gain_linear = random.uniform(0.0, 10.0);
+      options.gain_angular = random.uniform(0.0, 10.0);
+      options.max_linear_error = random.decades(-2.0, 1.0);
+      options.max_angular_error = random.decades(-2.0, 1.0);
+      options.length_scale = random.decades(-1.0, 1.0);
+      options.posture = regular_configuration(random, chain);
+      options.posture_gain = random.uniform(0.0, 5.0);
+      options.posture_max_speed = random.decades(-2.0, 1.0);
+      const Method method = DampedLeastSquares{random.decades(-2.0, 0.0)};  // lets some of everything through
+      const JointVector start = regular_configuration(random, chain);
+      const Pose target = pose(chain, regular_configuration(random, chain));
+      Servo servo(chain, method, options);
+      servo.reset(start);
+      const ServoStep step = servo.update(target);
+
+      ChainState state;
+      update(chain, start, state);
+      Twist twist = pose_error(state.tip, target);
+      CHECK(step.pose_error == twist);
+      twist.head<3>() *= options.gain_linear * std::min(1.0, options.max_linear_error / twist.head<3>().norm());
+      twist.tail<3>() *= options.gain_angular * std::min(1.0, options.max_angular_error / twist.tail<3>().norm());
+      JointVector posture(chain.dof());
+      for (int i = 0; i < chain.dof(); ++i) {
+        double away = options.posture[i] - start[i];
+        if (chain.joint_types()[static_cast<std::size_t>(i)] == JointType::Continuous) {
+          away = std::remainder(away, 2.0 * std::numbers::pi);
+        }
+        posture[i] = std::clamp(options.posture_gain * away, -options.posture_max_speed, options.posture_max_speed);
+      }
+      VelocitySolver solver(method, options.length_scale);
+      const Solution expected = solver.solve(state.jacobian, twist, posture);
+      CHECK((step.qdot - expected.qdot).norm() < 1e-10 * (1.0 + expected.qdot.norm()));
+      CHECK((step.achieved_twist - expected.achieved_twist).norm() < 1e-10 * (1.0 + expected.qdot.norm()));
+      CHECK((step.singular_values - expected.singular_values).norm() < 1e-12 * expected.singular_values[0]);
+      CHECK(step.status == expected.status);
+      CHECK(step.task_rows == 6);
+    }
+  }
+}
+
 TEST_CASE("without velocity limits nothing is held back") {
   const Chain& chain = arms().at("ufactory_xarm7");
   ServoOptions options;
