@@ -178,5 +178,55 @@ void velocity_kdl_pinv_givens(benchmark::State& state) {
 }
 BENCHMARK(velocity_kdl_pinv_givens);
 
+// Position -----------------------------------------------------------------------------------------------------------
+
+// The KUKA's poses all over its joints' ranges, and postures 0.1 rad about from those that led there.
+struct Poses {
+  sigmaik::AnalyticIk ik{sigmaik::Chain::from_urdf(std::string(SIGMAIK_ROBOTS_DIR) + "/kuka_kr6_r900.urdf")};
+  std::vector<sigmaik::Pose> pose;
+  std::vector<JointVector> near;
+
+  Poses() {
+    const sigmaik::JointLimits& limits = ik.chain().limits();
+    std::mt19937_64 generator(1);
+    std::uniform_real_distribution<double> uniform(0.0, 1.0);
+    for (int i = 0; i < kPath; ++i) {
+      JointVector q(6);
+      for (int j = 0; j < 6; ++j) q[j] = limits.lower[j] + uniform(generator) * (limits.upper[j] - limits.lower[j]);
+      pose.push_back(sigmaik::pose(ik.chain(), q));
+      for (int j = 0; j < 6; ++j) q[j] += 0.1 * (uniform(generator) - 0.5);
+      near.push_back(q);
+    }
+  }
+};
+
+const Poses& poses() {
+  static const Poses instance;
+  return instance;
+}
+
+void analytic_ik_solve(benchmark::State& state) {
+  const Poses& p = poses();
+  int i = 0;
+  for (auto _ : state) {
+    const sigmaik::AnalyticSolutions solutions = p.ik.solve(p.pose[i++ & (kPath - 1)]);
+    benchmark::DoNotOptimize(&solutions);
+    benchmark::ClobberMemory();
+  }
+}
+BENCHMARK(analytic_ik_solve);
+
+void analytic_ik_nearest(benchmark::State& state) {
+  const Poses& p = poses();
+  int i = 0;
+  for (auto _ : state) {
+    const int k = i++ & (kPath - 1);
+    const sigmaik::AnalyticNearest nearest = p.ik.nearest(p.pose[k], p.near[k]);
+    benchmark::DoNotOptimize(&nearest);
+    benchmark::ClobberMemory();
+  }
+}
+BENCHMARK(analytic_ik_nearest);
+
 }  // namespace
 

@@ -127,23 +127,35 @@ TaskJacobian jacobian_argument(py::handle object, const char* what) {
   return Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(array.data(), m, n);
 }
 
+std::array<bool, 6> rows_argument(py::handle rows, const char* what) {
+  const Array array = array_argument(rows, what, {6}, "(6,): vx vy vz ωx ωy ωz");
+  std::array<bool, 6> out{};
+  for (py::ssize_t i = 0; i < 6; ++i) {
+    const double entry = array.data()[i];
+    if (entry != 0.0 && entry != 1.0) {
+      throw Error(std::string(what) + "[" + std::to_string(i) + "] = " + py::str(py::float_(entry)).cast<std::string>() +
+                  " must be 0 or 1");
+    }
+    out[static_cast<std::size_t>(i)] = entry == 1.0;
+  }
+  return out;
+}
+
 Task task_argument(py::handle mask, const std::string& frame) {
   Task task;
-  if (!mask.is_none()) {
-    const Array array = array_argument(mask, "mask", {6}, "(6,): vx vy vz ωx ωy ωz");
-    for (py::ssize_t i = 0; i < 6; ++i) {
-      const double entry = array.data()[i];
-      if (entry != 0.0 && entry != 1.0) {
-        throw Error("mask[" + std::to_string(i) + "] = " + py::str(py::float_(entry)).cast<std::string>() +
-                    " must be 0 or 1");
-      }
-      task.mask[static_cast<std::size_t>(i)] = entry == 1.0;
-    }
-  }
+  if (!mask.is_none()) task.mask = rows_argument(mask, "mask");
   if (frame != "base" && frame != "tool") throw Error("frame = '" + frame + "' must be 'base' or 'tool'");
   task.frame = frame == "tool" ? Frame::Tool : Frame::Base;
   task.validate();
   return task;
+}
+
+Indices indices(std::uint32_t bits) {
+  py::list out;
+  for (int i = 0; i < 32; ++i) {
+    if ((bits >> i & 1u) != 0) out.append(i);
+  }
+  return py::tuple(out);
 }
 
 }  // namespace sigmaik::bindings

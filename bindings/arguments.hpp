@@ -7,6 +7,7 @@
 #include <pybind11/stl.h>
 #include <pybind11/typing.h>
 
+#include <array>
 #include <optional>
 #include <string>
 
@@ -60,6 +61,9 @@ Eigen::Matrix3d rotation_argument(py::handle object, const char* what);
 /// m×n, 1 ≤ m ≤ 6, 1 ≤ n ≤ 16.
 TaskJacobian jacobian_argument(py::handle object, const char* what);
 
+/// Six truth values, one a row of a twist.
+std::array<bool, 6> rows_argument(py::handle rows, const char* what);
+
 /// Mask (six truth values, None for all) and frame ("base" or "tool").
 Task task_argument(py::handle mask, const std::string& frame);
 
@@ -78,12 +82,19 @@ py::array_t<double> to_numpy(const Eigen::MatrixBase<Derived>& values) {
   }
 }
 
+/// Positions of the bits that are set.
+using Indices = py::typing::Tuple<py::int_, py::ellipsis>;
+Indices indices(std::uint32_t bits);
+
 void bind_status(py::module_& m);
 void bind_chain(py::module_& m);
 void bind_methods(py::module_& m);
 void bind_solver(py::module_& m);
 void bind_servo(py::module_& m);
 void bind_dynamics(py::module_& m);
+void bind_least_squares(py::module_& m);
+void bind_constrained_ik(py::module_& m);
+void bind_analytic_ik(py::module_& m);
 
 }  // namespace sigmaik::bindings
 

@@ -63,6 +63,7 @@ void bind_chain(py::module_& m) {
                              "(n,) [rad/s or m/s]")
       .def_property_readonly("acceleration", [](const JointLimits& l) { return to_numpy(l.acceleration); },
                              "(n,) [rad/s² or m/s²]")
+      .def_property_readonly("jerk", [](const JointLimits& l) { return to_numpy(l.jerk); }, "(n,) [rad/s³ or m/s³]")
       .def_property_readonly("effort", [](const JointLimits& l) { return to_numpy(l.effort); }, "(n,) [N·m or N]");
 
   py::class_<Chain>(m, "Chain",
@@ -110,15 +111,17 @@ void bind_chain(py::module_& m) {
       .def(
           "with_limits",
           [](const Chain& c, const MaybeArray& lower, const MaybeArray& upper, const MaybeArray& velocity,
-             const MaybeArray& acceleration, const MaybeArray& effort) {
+             const MaybeArray& acceleration, const MaybeArray& jerk, const MaybeArray& effort) {
             const JointLimits& old = c.limits();
             return c.with_limits({limit_argument(lower, "lower", old.lower), limit_argument(upper, "upper", old.upper),
                                   limit_argument(velocity, "velocity", old.velocity),
                                   limit_argument(acceleration, "acceleration", old.acceleration),
+                                  limit_argument(jerk, "jerk", old.jerk),
                                   limit_argument(effort, "effort", old.effort)});
           },
           py::kw_only(), py::arg("lower") = py::none(), py::arg("upper") = py::none(),
-          py::arg("velocity") = py::none(), py::arg("acceleration") = py::none(), py::arg("effort") = py::none(),
+          py::arg("velocity") = py::none(), py::arg("acceleration") = py::none(), py::arg("jerk") = py::none(),
+          py::arg("effort") = py::none(),
           "The same arm with other limits: (n,) or one number each, infinite for none; None keeps what there is.")
       .def(
           "pose",

@@ -4,8 +4,9 @@ namespace sigmaik::bindings {
 namespace {
 
 OnLimit on_limit_argument(const std::string& text) {
+  if (text == "redistribute") return OnLimit::Redistribute;
   if (text == "scale") return OnLimit::Scale;
-  throw Error("on_limit = '" + text + "' must be 'scale'");
+  throw Error("on_limit = '" + text + "' must be 'redistribute' or 'scale'");
 }
 
 // Python gets an exception where C++ gets a status; the servo keeps its state and holds.
@@ -30,17 +31,9 @@ void bind_servo(py::module_& m) {
                              "(6,) [m, rad] target minus tip before the step, unshortened; zero for twist commands")
       .def_property_readonly("achieved_twist", [](const ServoStep& s) { return to_numpy(s.achieved_twist); },
                              "(6,) J q̇ [m/s, rad/s]")
-      .def_readonly("scale", &ServoStep::scale, "In [0, 1]: what limits left of the rule's answer.")
-      .def_property_readonly(
-          "limiting_joints",
-          [](const ServoStep& s) -> py::typing::Tuple<py::int_, py::ellipsis> {
-            py::list joints;
-            for (int i = 0; i < s.q.size(); ++i) {
-              if ((s.limiting_joints >> i & 1u) != 0) joints.append(i);
-            }
-            return py::tuple(joints);
-          },
-          "Indices of the joints whose limits determine `scale`.")
+      .def_readonly("scale", &ServoStep::scale, "In [0, 1], what limits left: of the rule's speed ('scale'), or of its twist along itself ('redistribute').")
+      .def_property_readonly("limiting_joints", [](const ServoStep& s) { return indices(s.limiting_joints); },
+                             "Indices of the joints held at a limit that the rule's answer would break.")
       .def_property_readonly("singular_values", [](const ServoStep& s) { return to_numpy(s.singular_values); },
                              "Singular values of the weighted task Jacobian, from large to small.")
       .def_property_readonly(
@@ -58,11 +51,13 @@ void bind_servo(py::module_& m) {
 
   py::class_<Servo>(m, "Servo",
                     "Drives a chain's reference configuration towards poses, or along twists, one cycle a call.\n\n"
-                    "It integrates its own command (q ← q + q̇ dt) and reads no measured positions.")
+                    "It integrates its own command (q ← q + q̇ dt) and reads no measured positions. Every command holds\n"
+                    "the chain's limits and leaves room to go on holding them; a start outside them comes back.")
       .def(py::init([](const Chain& chain, const Method& method, double dt, double gain_linear, double gain_angular,
                        double max_linear_error, double max_angular_error, double soft_start, const MaybeArray& posture,
-                       double posture_gain, double posture_max_speed, bool velocity_limits, const std::string& on_limit,
-                       double length_scale, const MaybeArray& mask, const std::string& frame) {
+                       double posture_gain, double posture_max_speed, bool position_limits, bool velocity_limits,
+                       bool acceleration_limits, bool jerk_limits, double recovery_speed, const std::string& on_limit,
+                       const MaybeArray& exact, double length_scale, const MaybeArray& mask, const std::string& frame) {
              ServoOptions options;
              options.dt = dt;
              options.gain_linear = gain_linear;
@@ -73,7 +68,12 @@ void bind_servo(py::module_& m) {
              options.posture = optional_joint_argument(object_of(posture), "posture", chain.dof());
              options.posture_gain = posture_gain;
              options.posture_max_speed = posture_max_speed;
+             options.position_limits = position_limits;
              options.velocity_limits = velocity_limits;
+             options.acceleration_limits = acceleration_limits;
+             options.jerk_limits = jerk_limits;
+             options.recovery_speed = recovery_speed;
+             if (exact) options.exact = rows_argument(*exact, "exact");
              options.on_limit = on_limit_argument(on_limit);
              options.length_scale = length_scale;
              options.task = task_argument(object_of(mask), frame);
@@ -85,8 +85,10 @@ void bind_servo(py::module_& m) {
            py::arg("max_angular_error") = ServoOptions{}.max_angular_error,
            py::arg("soft_start") = ServoOptions{}.soft_start, py::arg("posture") = py::none(),
            py::arg("posture_gain") = ServoOptions{}.posture_gain,
-           py::arg("posture_max_speed") = ServoOptions{}.posture_max_speed, py::arg("velocity_limits") = true,
-           py::arg("on_limit") = "scale", py::arg("length_scale") = 1.0, py::arg("mask") = py::none(),
+           py::arg("posture_max_speed") = ServoOptions{}.posture_max_speed, py::arg("position_limits") = true,
+           py::arg("velocity_limits") = true, py::arg("acceleration_limits") = true, py::arg("jerk_limits") = true,
+           py::arg("recovery_speed") = ServoOptions{}.recovery_speed, py::arg("on_limit") = "redistribute",
+           py::arg("exact") = py::none(), py::arg("length_scale") = 1.0, py::arg("mask") = py::none(),
            py::arg("frame") = "base",
            "dt: [s] from one update to the next.\n"
            "gain_linear, gain_angular: [1/s] from pose error to twist.\n"
@@ -95,7 +97,12 @@ void bind_servo(py::module_& m) {
            "    was told that the arm moves.\n"
            "posture: (n,) nominal positions, by default those given to reset(); posture_gain [1/s];\n"
            "posture_max_speed [rad/s or m/s] caps each joint.\n"
-           "velocity_limits: hold the chain's; on_limit 'scale': all joints slow down together.\n"
+           "position_limits, …: which of the chain's limits are held, now and so that they can be held for ever.\n"
+           "recovery_speed: in (0, 1], of the velocity limit, least speed of a joint that starts outside its position\n"
+           "    limits on its way back.\n"
+           "on_limit: what gives way. 'redistribute': other joints take over, for the nearest twist that limits allow;\n"
+           "    'scale': direction kept, speed given up.\n"
+           "exact: (6,) truth values: rows (vx, vy, vz, ωx, ωy, ωz) that come before the others when redistributing.\n"
            "length_scale, mask, frame: as for VelocitySolver.")
       .def(
           "reset",

@@ -14,7 +14,7 @@ void bind_status(py::module_& m) {
       .value("DAMPED", Status::Damped, "near a singularity: part of the command is damped, or cannot be done")
       .value("LIMITED", Status::Limited, "a joint limit holds part of the command back")
       .value("HOLDING", Status::Holding, "no motion: there is no target, or none is allowed")
-      .value("BAD_INPUT", Status::BadInput, "NaN, infinite, not a rotation, or a wrong size: zero velocity")
+      .value("BAD_INPUT", Status::BadInput, "NaN, infinite, not a rotation, or a wrong size: the arm stops as fast as its limits allow")
       .finalize();
 
   m.def(
@@ -47,8 +47,11 @@ PYBIND11_MODULE(_core, m) {
   m.attr("__version__") = SIGMAIK_VERSION;
   bind_status(m);
   bind_chain(m);
+  bind_analytic_ik(m);
   bind_methods(m);
   bind_solver(m);
   bind_servo(m);
   bind_dynamics(m);
+  bind_least_squares(m);
+  bind_constrained_ik(m);
 }

@@ -30,7 +30,7 @@ void check_limits(const Segment& s) {
   require(s.lower < kInfinity && s.upper > -kInfinity, label(s), ": no position lies between lower = ", s.lower,
           " and upper = ", s.upper);
   const std::pair<const char*, double> positive[] = {
-      {"velocity", s.velocity}, {"acceleration", s.acceleration}, {"effort", s.effort}};
+      {"velocity", s.velocity}, {"acceleration", s.acceleration}, {"jerk", s.jerk}, {"effort", s.effort}};
   for (const auto& [what, value] : positive) {
     check_bound(s, what, value);
     require(value > 0.0, label(s), ": ", what, " limit must be above 0 (infinite for none), got ", value);
@@ -114,7 +114,8 @@ Chain::Chain(std::string base, std::vector<Segment> segments) {
   const int n = static_cast<int>(movable.size());
   model->dof = n;
   JointLimits& limits = model->limits;
-  for (JointVector* v : {&limits.lower, &limits.upper, &limits.velocity, &limits.acceleration, &limits.effort}) {
+  for (JointVector* v : {&limits.lower, &limits.upper, &limits.velocity, &limits.acceleration, &limits.jerk,
+                         &limits.effort}) {
     v->resize(n);
   }
 
@@ -136,6 +137,7 @@ Chain::Chain(std::string base, std::vector<Segment> segments) {
     limits.upper[i] = s.upper;
     limits.velocity[i] = s.velocity;
     limits.acceleration[i] = s.acceleration;
+    limits.jerk[i] = s.jerk;
     limits.effort[i] = s.effort;
     model->joint_names.push_back(s.joint_name);
     model->joint_types.push_back(s.type);
@@ -152,6 +154,7 @@ Chain Chain::with_limits(const JointLimits& limits) const {
                                                             {"upper", &limits.upper},
                                                             {"velocity", &limits.velocity},
                                                             {"acceleration", &limits.acceleration},
+                                                            {"jerk", &limits.jerk},
                                                             {"effort", &limits.effort}};
   for (const auto& [what, values] : all) {
     require(values->size() == dof(), what, " has ", values->size(), " entries, the chain ", dof(), " joints");
@@ -166,6 +169,7 @@ Chain Chain::with_limits(const JointLimits& limits) const {
     s.upper = limits.upper[i];
     s.velocity = limits.velocity[i];
     s.acceleration = limits.acceleration[i];
+    s.jerk = limits.jerk[i];
     s.effort = limits.effort[i];
     ++i;
   }

@@ -462,6 +462,7 @@ void read_limits(const TreeJoint& from, const urdf::Joint& joint, Segment& segme
   if (limit->Attribute("acceleration") != nullptr) {
     segment.acceleration = none_if_huge(number(from.label(), *limit, "acceleration"));
   }
+  if (limit->Attribute("jerk") != nullptr) segment.jerk = none_if_huge(number(from.label(), *limit, "jerk"));
   if (segment.type == JointType::Continuous) return;
   segment.lower = none_if_huge(joint.limits->lower);
   segment.upper = none_if_huge(joint.limits->upper);

@@ -376,7 +376,7 @@ TEST_CASE("from KDL: no names, no limits") {
   CHECK(chain.joint_types() == std::vector<JointType>{JointType::Revolute, JointType::Revolute, JointType::Prismatic,
                                                       JointType::Revolute});
   for (const JointVector* limit : {&chain.limits().upper, &chain.limits().velocity, &chain.limits().acceleration,
-                                   &chain.limits().effort}) {
+                                   &chain.limits().jerk, &chain.limits().effort}) {
     CHECK((limit->array() == std::numeric_limits<double>::infinity()).all());
   }
   CHECK((chain.limits().lower.array() == -std::numeric_limits<double>::infinity()).all());

@@ -263,9 +263,9 @@ TEST_CASE("numbers") {
   for (const std::string bad : {"nan", "inf", "-inf", "1e999", "1,5", "0x10", "1.0f", "", "a", "1 2", "--1", "+-1"}) {
     CAPTURE(bad);
     const std::string shown = "\"" + bad + "\"";
-    for (const std::string attribute : {"lower", "upper", "velocity", "effort", "acceleration"}) {
+    for (const std::string attribute : {"lower", "upper", "velocity", "effort", "acceleration", "jerk"}) {
       std::string limit = "<limit";
-      for (const std::string a : {"lower", "upper", "velocity", "effort", "acceleration"}) {
+      for (const std::string a : {"lower", "upper", "velocity", "effort", "acceleration", "jerk"}) {
         limit += " " + a + "='" + (a == attribute ? bad : a == "lower" ? "-1" : "1") + "'";
       }
       check_facts(refusal(arm(limit + "/>")), {"'j2'", "<limit", attribute, shown, "one finite number"});
@@ -308,6 +308,8 @@ TEST_CASE("limits that contradict themselves or are not there") {
   check_facts(limit("lower='-1' upper='1' velocity='1' effort='-2'"), {"'j2'", "effort", "-2"});
   check_facts(limit("lower='-1' upper='1' velocity='1' effort='1' acceleration='0'"), {"'j2'", "acceleration", "0"});
   check_facts(limit("lower='-1' upper='1' velocity='1' effort='1' acceleration='-3'"), {"'j2'", "acceleration", "-3"});
+  check_facts(limit("lower='-1' upper='1' velocity='1' effort='1' jerk='0'"), {"'j2'", "jerk", "0"});
+  check_facts(limit("lower='-1' upper='1' velocity='1' effort='1' jerk='-3'"), {"'j2'", "jerk", "-3"});
   check_facts(limit("lower='-1' upper='1' effort='1'"), {"urdfdom", "no velocity", "[j2]"});
   check_facts(limit("lower='-1' upper='1' velocity='1'"), {"urdfdom", "no effort", "[j2]"});
   check_facts(refusal(arm(kLimit + kLimit)), {"'j2'", "second <limit>"});
@@ -315,12 +317,14 @@ TEST_CASE("limits that contradict themselves or are not there") {
 
 TEST_CASE("huge limits are none") {
   const Chain chain = Chain::from_urdf(
-      arm("<limit lower='-1e16' upper='1.7976931348623157e308' velocity='1e9' effort='9.9e8' acceleration='1e16'/>"));
+      arm("<limit lower='-1e16' upper='1.7976931348623157e308' velocity='1e9' effort='9.9e8' acceleration='1e16'"
+          " jerk='1e9'/>"));
   CHECK(chain.limits().lower[1] == -kInfinity);
   CHECK(chain.limits().upper[1] == kInfinity);
   CHECK(chain.limits().velocity[1] == kInfinity);
   CHECK(chain.limits().effort[1] == 9.9e8);
   CHECK(chain.limits().acceleration[1] == kInfinity);
+  CHECK(chain.limits().jerk[1] == kInfinity);
   check_facts(refusal(arm("<limit lower='1e16' upper='1e17' velocity='1' effort='1'/>")), {"'j2'", "lower"});
   check_facts(refusal(arm("<limit lower='-1' upper='1' velocity='-1e16' effort='1'/>")), {"'j2'", "velocity"});
 }
@@ -370,7 +374,8 @@ TEST_CASE("every kind of joint and limit") {
       joint("turn", "continuous", "b", "l1", "<limit lower='-1' upper='1' velocity='0' effort='6'/>") +
       joint("stay", "fixed", "l1", "l2", "<axis xyz=''/><limit/><mimic joint='turn'/><origin xyz='0 0 1'/>") +
       joint("slide", "prismatic", "l2", "l3", "<axis xyz='0 3 -4'/><limit upper='0.5' velocity='2' effort='0'/>") +
-      joint("bend", "revolute", "l3", "l4", "<limit lower='-2' velocity='2.5' effort='7' acceleration='8'/>")));
+      joint("bend", "revolute", "l3", "l4",
+            "<limit lower='-2' velocity='2.5' effort='7' acceleration='8' jerk='90'/>")));
   CHECK(chain.base() == "b");
   CHECK(chain.tip() == "l4");
   CHECK(chain.joint_names() == std::vector<std::string>{"turn", "slide", "bend"});
@@ -382,6 +387,7 @@ TEST_CASE("every kind of joint and limit") {
   CHECK(chain.limits().velocity == row(kInfinity, 2.0, 2.5));
   CHECK(chain.limits().effort == row(6.0, kInfinity, 7.0));
   CHECK(chain.limits().acceleration == row(kInfinity, kInfinity, 8.0));
+  CHECK(chain.limits().jerk == row(kInfinity, kInfinity, 90.0));
   REQUIRE(chain.segments().size() == 4);
   CHECK(chain.segments()[0].axis == Eigen::Vector3d::UnitX());  // URDF's default
   CHECK(chain.segments()[1].type == JointType::Fixed);

@@ -60,8 +60,11 @@ def test_names_fixed_by_the_design():
     assert len(chain.joint_names) == 7
     assert isinstance(chain.base, str)
     assert isinstance(chain.tip, str)
-    for limit in ("lower", "upper", "velocity", "acceleration", "effort"):
+    for limit in ("lower", "upper", "velocity", "acceleration", "jerk", "effort"):
         assert getattr(chain.limits, limit).shape == (7,)
+    assert np.isinf(chain.limits.jerk).all()
+    jerk = np.arange(1.0, 8.0)
+    np.testing.assert_array_equal(chain.with_limits(jerk=jerk).limits.jerk, jerk)
     assert chain.pose(q).shape == (4, 4)
     assert chain.jacobian(q).shape == (6, 7)
     assert chain.jacobian_gradient(q).shape == (7, 6, 7)

@@ -37,6 +37,7 @@ struct Segment {
   double upper = std::numeric_limits<double>::infinity();          ///< [rad or m]
   double velocity = std::numeric_limits<double>::infinity();       ///< [rad/s or m/s], > 0
   double acceleration = std::numeric_limits<double>::infinity();   ///< [rad/s² or m/s²], > 0
+  double jerk = std::numeric_limits<double>::infinity();           ///< [rad/s³ or m/s³], > 0
   double effort = std::numeric_limits<double>::infinity();         ///< [N·m or N], > 0
   std::optional<Inertia> inertia;                      ///< of the link, where it is known
 };
@@ -46,6 +47,7 @@ struct JointLimits {
   JointVector lower, upper;  ///< [rad or m]
   JointVector velocity;      ///< [rad/s or m/s]
   JointVector acceleration;  ///< [rad/s² or m/s²]
+  JointVector jerk;          ///< [rad/s³ or m/s³]
   JointVector effort;        ///< [N·m or N]
 };
 

@@ -8,7 +8,13 @@
 
 namespace sigmaik {
 
-/// Rigid-body dynamics M(q) q̈ + C(q, q̇) q̇ + g(q) = τ. Allocates; not for the loop. Not to be shared between threads.
+/// M(q) and C(q, q̇) q̇ + g(q), without heap.
+struct DynamicsTerms {
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kMaxJoints, kMaxJoints> mass;  ///< (n, n)
+  JointVector bias;  ///< (n,) [N·m or N]: the torque that gives no acceleration
+};
+
+/// Rigid-body dynamics M(q) q̈ + C(q, q̇) q̇ + g(q) = τ. Not to be shared between threads.
 class Dynamics {
  public:
   /// \param gravity [m/s²], in base axes
@@ -19,6 +25,11 @@ class Dynamics {
   Dynamics& operator=(Dynamics&&) noexcept;
 
   int dof() const noexcept;
+  /// Both terms at q, q̇ (n,), which must have that size and be finite. Real time.
+  void evaluate(const JointRef& q, const JointRef& qdot, DynamicsTerms& terms) noexcept;
+
+  // These allocate, and are not for the loop.
+
   /// M (n, n) [kg·m²] at q (n,). \throws Error where a size is wrong
   Eigen::MatrixXd mass_matrix(const Eigen::VectorXd& q) const;
   /// C(q, q̇) q̇ (n,) [N·m] at q, q̇ (n,). \throws Error where a size is wrong

@@ -2,18 +2,24 @@
 /// \file servo.hpp
 /// Pose or twist in, joint command out, each cycle. The only thing with a history.
 
+#include <array>
 #include <cstdint>
 #include <limits>
 
 #include <sigmaik/chain.hpp>
 #include <sigmaik/kinematics.hpp>
+#include <sigmaik/least_squares.hpp>
+#include <sigmaik/limits.hpp>
 #include <sigmaik/status.hpp>
 #include <sigmaik/velocity_solver.hpp>
 
 namespace sigmaik {
 
-/// What gives way where a joint limit would be broken.
+/// What gives way where a joint limit would be broken. While none would be, the rule's answer stands, to the last digit.
 enum class OnLimit {
+  /// Other joints take over: of all that the limits allow, the velocities whose twist is nearest to the rule's, and of
+  /// these the nearest to the rule's own. Along directions that are singular, those alone.
+  Redistribute,
   Scale,  ///< direction kept, speed given up: all joints slow down together
 };
 
@@ -30,8 +36,14 @@ struct ServoOptions {
   JointVector posture{};       ///< (n,) nominal positions; empty: the positions given to reset()
   double posture_gain = 0.0;   ///< [1/s] ≥ 0
   double posture_max_speed = std::numeric_limits<double>::infinity();  ///< [rad/s or m/s] > 0, a joint
-  bool velocity_limits = true;  ///< hold the chain's velocity limits
-  OnLimit on_limit = OnLimit::Scale;
+  bool position_limits = true;  ///< which of the chain's limits are held; see limits.hpp
+  bool velocity_limits = true;
+  bool acceleration_limits = true;
+  bool jerk_limits = true;
+  double recovery_speed = 0.1;  ///< in (0, 1], of the velocity limit: least speed back inside the position limits
+  OnLimit on_limit = OnLimit::Redistribute;
+  /// Rows (vx, vy, vz, ωx, ωy, ωz), in the task's axes, that come before the others where Redistribute cannot do all.
+  std::array<bool, 6> exact{};
   double length_scale = 1.0;    ///< [m], see VelocitySolver
   Task task{};                  ///< rows that matter
 };
@@ -43,8 +55,9 @@ struct ServoStep {
   Status status = Status::BadInput;
   Twist pose_error = Twist::Zero();  ///< target minus tip before the step, unshortened; zero for twist commands
   Twist achieved_twist = Twist::Zero();  ///< J q̇
-  double scale = 1.0;                ///< in [0, 1]: what limits left of the rule's answer
-  std::uint16_t limiting_joints = 0;  ///< bit i: joint i's limit determines `scale`
+  /// In [0, 1], what limits left: of the rule's speed (Scale), or of its twist along itself (Redistribute).
+  double scale = 1.0;
+  std::uint16_t limiting_joints = 0;  ///< bit i: joint i is held at a limit that the rule's answer would break
   TaskVector singular_values;        ///< of the weighted task Jacobian
   std::uint8_t singular = 0;         ///< bit i: direction i is singular to the rule
   int task_rows = 0;                 ///< m', the number of directions
@@ -52,6 +65,9 @@ struct ServoStep {
 
 /// Drives a chain's own reference configuration towards poses, or along twists. It integrates the command that it
 /// gives (q ← q + q̇ dt) and never reads measured positions, so sensor noise cannot enter.
+///
+/// Every command holds the chain's position, velocity, acceleration and jerk limits, and leaves room to go on holding
+/// them (limits.hpp). A start outside them comes back by itself. Bad input stops the arm as fast as they allow.
 class Servo {
  public:
   /// \throws Error where an option is out of its range
@@ -63,7 +79,8 @@ class Servo {
   /// \throws Error where a size is wrong or an entry is not finite
   void reset(const JointRef& q, const JointRef& qdot = JointVector());
 
-  /// One cycle towards a pose of the tip in base. Real time. A target that is not a pose is refused: BadInput, q̇ = 0.
+  /// One cycle towards a pose of the tip in base. Real time. A target that is not a pose is refused: BadInput, and the
+  /// arm stops.
   ServoStep update(const Pose& target) noexcept;
 
   /// One cycle along a twist [v; ω], base axes, at the tip's origin. Real time.
@@ -77,20 +94,30 @@ class Servo {
   const ServoOptions& options() const noexcept { return options_; }
   const Method& method() const noexcept { return solver_.method(); }
   /// (n,) where the reference stands; empty before reset().
-  const JointVector& q() const noexcept { return q_; }
+  const JointVector& q() const noexcept { return tracker_.q(); }
+  /// (n,) velocity of the last cycle.
+  const JointVector& qdot() const noexcept { return tracker_.qdot(); }
   /// Pose of the tip at q().
   const Pose& tip() const noexcept { return state_.tip; }
 
  private:
-  ServoStep hold(Status status) const noexcept;
+  ServoStep stop(Status status) noexcept;
   ServoStep resolve(const Twist& twist, bool fade) noexcept;
   JointVector posture_velocity() const noexcept;
+  void redistribute(ServoStep& step) noexcept;
+  void scale(ServoStep& step) const noexcept;
+  void take(ServoStep& step) noexcept;
 
   Chain chain_;
   ServoOptions options_;
+  Task exact_;
   VelocitySolver solver_;
+  LimitTracker tracker_;
+  LeastSquares least_squares_;
+  LeastSquaresProblem problem_;
+  Spectrum exact_spectrum_;
   ChainState state_;
-  JointVector q_, nominal_, qdot_start_;
+  JointVector nominal_, qdot_start_;
   double fade_ = 1.0;
 };
 

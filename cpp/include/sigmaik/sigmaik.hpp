@@ -9,21 +9,25 @@
 ///     chain.hpp            Chain: the arm, immutable; from URDF     kdl.hpp     from and to KDL::Chain (not included)
 ///     pose.hpp             rotation_log, rotation_exp, pose_error
 ///     kinematics.hpp       update(chain, q, state): pose and Jacobian; jacobian_gradient
+///     analytic_ik.hpp      AnalyticIk: every posture of a pose, for six joints with a spherical wrist
 ///     spectrum.hpp         Spectrum: singular value decomposition with a warm start
 ///     inverse.hpp          JParse, DampedLeastSquares, …: one rule per singular direction
 ///     task.hpp             Task: which rows of a twist, in which axes
 ///     velocity_solver.hpp  VelocitySolver: rule and posture → Solution
 ///     batch.hpp            solve_batch: many at once
+///     limits.hpp           LimitTracker: position, velocity, acceleration and jerk limits → this cycle's bounds
 ///     servo.hpp            Servo: pose or twist in, joint command out, each cycle
 ///     dynamics.hpp         Dynamics: mass matrix, Coriolis, gravity, by KDL; not real time (not included)
 ///
 /// Set-up throws Error. Calls marked "real time" are noexcept, bounded, and touch neither heap nor lock.
 
+#include <sigmaik/analytic_ik.hpp>
 #include <sigmaik/batch.hpp>
 #include <sigmaik/chain.hpp>
 #include <sigmaik/error.hpp>
 #include <sigmaik/inverse.hpp>
 #include <sigmaik/kinematics.hpp>
+#include <sigmaik/limits.hpp>
 #include <sigmaik/pose.hpp>
 #include <sigmaik/servo.hpp>
 #include <sigmaik/spectrum.hpp>

@@ -12,7 +12,7 @@ enum class Status : std::int8_t {
   Damped = 1,    ///< near a singularity: part of the command is damped, or cannot be done
   Limited = 2,   ///< a joint limit holds part of the command back
   Holding = 3,   ///< no motion: there is no target, or none is allowed
-  BadInput = 4,  ///< NaN, infinite, not a rotation, or a wrong size: zero velocity
+  BadInput = 4,  ///< NaN, infinite, not a rotation, or a wrong size: a stop, as fast as limits allow
 };
 
 /// "ok", "damped", "limited", "holding", "bad input".

@@ -175,7 +175,11 @@ def run(
         posture=experiment.posture,
         posture_gain=s.posture_gain,
         posture_max_speed=s.posture_max_speed,
+        position_limits=False,
         velocity_limits=velocity_limits,
+        acceleration_limits=False,
+        jerk_limits=False,
+        on_limit="scale",
         length_scale=s.length_scale,
     )
     servo.reset(experiment.start)

@@ -1,0 +1,132 @@
+#pragma once
+/// \file analytic_ik.hpp
+/// Closed-form inverse kinematics of six-joint arms with a spherical wrist: every posture of a pose.
+
+#include <array>
+#include <cstdint>
+
+#include <sigmaik/chain.hpp>
+#include <sigmaik/types.hpp>
+
+namespace sigmaik {
+
+/// Postures of a six-joint arm [rad].
+using SixJoints = Eigen::Matrix<double, 6, 1>;
+
+/// What AnalyticIk found.
+enum class AnalyticStatus : std::int8_t {
+  Ok = 0,           ///< at least one posture
+  Unreachable = 1,  ///< the pose is out of reach, by position or (where the wrist is not perpendicular) by orientation
+  BadInput = 2,     ///< NaN, infinite, not a rotation, or a wrong size
+};
+
+/// "ok", "unreachable", "bad input".
+const char* to_string(AnalyticStatus status) noexcept;
+
+/// Bits of AnalyticBranch::singular: where two branches have become one.
+enum AnalyticSingularity : std::uint8_t {
+  kShoulderSingular = 1,  ///< wrist centre in the plane through axis 1 along axis 2; on axis 1 itself, q1 is free
+  kElbowSingular = 2,     ///< stretched or folded; folded onto axis 2 (links of one length), q2 is free
+  kWristSingular = 4,     ///< axes 4, 5, 6 in one plane; where 4 and 6 are one line, only a sum of q4 and q6 is given
+};
+
+/// One posture of a pose.
+struct AnalyticBranch {
+  SixJoints q;                  ///< [rad]
+  bool within_limits = false;   ///< every joint within the chain's limits
+  std::uint8_t singular = 0;    ///< AnalyticSingularity bits
+};
+
+/// Answer of AnalyticIk::solve(). By value, no heap.
+struct AnalyticSolutions {
+  AnalyticStatus status = AnalyticStatus::BadInput;
+  int count = 0;                           ///< 0 to 8
+  std::array<AnalyticBranch, 8> branches;  ///< the first `count`
+
+  const AnalyticBranch* begin() const noexcept { return branches.data(); }
+  const AnalyticBranch* end() const noexcept { return branches.data() + count; }
+};
+
+/// Answer of AnalyticIk::nearest(). By value, no heap.
+struct AnalyticNearest {
+  AnalyticStatus status = AnalyticStatus::BadInput;
+  AnalyticBranch branch;  ///< meaningful where status is Ok
+};
+
+/// Inverse kinematics by subproblems with known answers: the wrist centre gives joint 1, then joints 2 and 3 as a
+/// planar arm; the orientation that is left gives joints 4, 5, 6. After
+///   D. Pieper, "The kinematics of manipulators under computer control", PhD thesis, Stanford, 1968;
+///   B. Paden, "Kinematics and control of robot manipulators", PhD thesis, UC Berkeley, 1985 (after W. Kahan);
+///   R. Murray, Z. Li, S. Sastry, "A Mathematical Introduction to Robotic Manipulation", CRC Press, 1994, section 3.3.
+///
+/// Covers every chain of six revolute or continuous joints, however its frames, signs and zeros are laid, where
+///   - axes 4, 5, 6 meet in one point, the wrist centre; axis 5 is parallel to neither 4 nor 6;
+///   - axes 2 and 3 are parallel and apart, and the wrist centre is off axis 3;
+///   - axis 1 is not parallel to axis 2. It need be neither perpendicular to it nor meet it.
+/// Coincidences hold within 1e-9: rad, or of the arm's size, which is the sum of the distances between the joints'
+/// frames from joint 1 to the tip. What differs (directions, axes 2 and 3) is apart by more than 1e-3: rad, or of the
+/// planar arm's length. An arm that only just meets the tolerance has answers as exact as that.
+///
+/// Answers reproduce the pose to rounding. A pose within 1e-12 (rad, or of size and mounting distance) of a singularity
+/// counts as singular, and is reproduced to that; one as little out of reach counts as reached by the stretched arm. A
+/// rotation that is one only to single precision is taken as the rotation nearest to it. One thing can get lost: where
+/// the axes of the wrist are not at right angles, a pose within 1e-6 of all three singularities at once may count as
+/// unreachable.
+///
+/// A value: cheap to copy, safe to use from many threads.
+class AnalyticIk {
+ public:
+  /// \throws Error with the facts where the arm is not of this kind
+  explicit AnalyticIk(const Chain& chain);
+
+  /// Every posture of `pose` (tip in base), also those outside the limits. Real time.
+  ///
+  /// Each joint is on the turn nearest to 0 within its limits; where there is none, in (−π, π]. Order: shoulder, elbow,
+  /// wrist, each first the one, then the other way, so that a branch keeps its place among the eight of a regular pose.
+  /// Branches that have become one at a singularity are given once; a free angle is as close to 0 as limits allow (and,
+  /// where an oblique wrist then cannot do the rest, the next of 32 around the circle at which it can).
+  AnalyticSolutions solve(const Pose& pose) const noexcept;
+
+  /// The posture of `pose` nearest to q (6,) [rad]: one within the limits where there is one, and of these the one of
+  /// the smallest Euclidean norm of the differences. Real time.
+  ///
+  /// Each joint is on the turn nearest to q within its limits; where there is none, on the turn nearest to q. An angle
+  /// that the pose leaves free stays as in q, or at the limit that q is beyond.
+  AnalyticNearest nearest(const Pose& pose, const JointRef& q) const noexcept;
+
+  const Chain& chain() const noexcept { return chain_; }
+
+ private:
+  friend struct AnalyticWalk;
+
+  struct Shoulder {
+    Eigen::Matrix3d from_base;        // base axes to those of the shoulder: z along axis 1, axis 2 in the plane of x, z
+    Eigen::Vector3d origin;           // of joint 1, in the base [m]
+    double c12, s12;                  // of the angle from axis 1 to axis 2
+    double height;                    // of the wrist centre along axis 2, seen from joint 1's origin [m]
+    double x, y;                      // axis 2 in its normal plane, seen from joint 1's origin [m]
+  };
+  struct Elbow {
+    double upper, fore;               // lengths of the planar arm [m]
+    double zero2, zero3;              // angles of the planar arm at q = 0
+    double sign3;                     // of axis 3 along axis 2
+  };
+  struct Wrist {
+    Eigen::Matrix3d from_fore;        // axes of the forearm to those of the wrist: z along axis 4, axis 5 in x, z
+    double c45, s45, c56, s56;        // of the angles between the axes
+    double c_sum, s_sum, c_diff, s_diff;  // of half their sum and half their difference
+    double zero5;                     // angle of the spherical triangle at q = 0
+    bool perpendicular;               // axis 5 to 4 and to 6
+  };
+
+  Chain chain_;
+  Shoulder shoulder_;
+  Elbow elbow_;
+  Wrist wrist_;
+  Eigen::Matrix3d tip_;  // in the tip's frame: the wrist centre [m], then x and z of the hand, z along axis 6
+  double reach_;         // of the wrist centre from joint 1's origin, at most [m]
+  double tolerance_;     // what counts as no distance [m]
+  SixJoints lower_, upper_;
+};
+
+}  // namespace sigmaik

@@ -1,0 +1,90 @@
+#pragma once
+/// \file least_squares.hpp
+/// Dense constrained least squares of the sizes of an arm, by an active set.
+///
+///     min |A x − b|²   where   C x = d,   lower ≤ x ≤ upper,   G x ≤ h
+///
+/// in the tradition of Lawson and Hanson (Solving Least Squares Problems, 1974) and Björck (Numerical Methods for Least
+/// Squares Problems, 1996): orthogonal transformations, no normal equations. There is always an answer. What cannot be
+/// had at once is given up in this order, each as little as possible (in the least-squares sense) before the next
+/// is looked at (Kanoun, Lamiraux and Wieber 2011; Escande, Mansard and Wieber 2014):
+///
+///     0. lower ≤ x ≤ upper     always kept
+///     1. G x ≤ h               min |max(0, G x − h)|²
+///     2. C x = d               min |C x − d|²
+///     3. A x ≈ b               min |A x − b|²
+///     4.                       min |x|²
+///
+/// The last makes the answer unique where ranks are short.
+
+#include <cstdint>
+
+#include <Eigen/Core>
+
+namespace sigmaik {
+
+inline constexpr int kMaxUnknowns = 24;      ///< 16 joints, a time scaling, and slack for 6 task rows
+inline constexpr int kMaxObjectives = 32;    ///< rows of A
+inline constexpr int kMaxEqualities = 8;     ///< rows of C
+inline constexpr int kMaxInequalities = 32;  ///< rows of G
+
+/// Bounded, so none touches the heap.
+using UnknownVector = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, kMaxUnknowns, 1>;
+using RowVector = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, kMaxObjectives, 1>;
+using RowMatrix =
+    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, kMaxObjectives, kMaxUnknowns>;
+
+/// The problem. A part that is empty is absent; the number of unknowns is that of the columns of A, C or G, or the size
+/// of the bounds.
+struct LeastSquaresProblem {
+  RowMatrix A;                 ///< (m, n)
+  RowVector b;                 ///< (m,)
+  RowMatrix C;                 ///< (p, n), p ≤ 8
+  RowVector d;                 ///< (p,)
+  UnknownVector lower, upper;  ///< (n,), lower ≤ upper, infinite where there is none
+  RowMatrix G;                 ///< (k, n)
+  RowVector h;                 ///< (k,), infinite where there is none
+};
+
+/// What solve() did.
+enum class LeastSquaresStatus : std::int8_t {
+  Optimal = 0,     ///< every constraint is met
+  Infeasible = 1,  ///< G x ≤ h or C x = d cannot be met: as well as possible, in the order above
+  StepLimit = 2,   ///< inside the bounds, but the last step was not the last needed
+  BadInput = 3,    ///< sizes that do not fit, NaN, infinite entries, lower > upper: x is zero
+};
+
+/// "optimal", "infeasible", "step limit", "bad input".
+const char* to_string(LeastSquaresStatus status) noexcept;
+
+struct LeastSquaresSolution {
+  UnknownVector x;                                          ///< (n,) inside the bounds exactly
+  LeastSquaresStatus status = LeastSquaresStatus::BadInput;
+  int steps = 0;                ///< factorisations taken; 1 where the last active set still fits
+  std::uint32_t at_lower = 0;   ///< bit i: the answer is held at lower[i]
+  std::uint32_t at_upper = 0;   ///< bit i: the answer is held at upper[i]
+  std::uint32_t active = 0;     ///< bit k: the answer is held at row k of G, or violates it
+  double violation = 0.0;       ///< |max(0, G x − h)|
+  double equality_error = 0.0;  ///< |C x − d|
+};
+
+/// Solves problems one after the other; what one had active is the next one's first guess. The answer does not depend
+/// on the guess where it is unique to rounding.
+class LeastSquares {
+ public:
+  /// Real time: no heap, a bounded number of steps.
+  LeastSquaresSolution solve(const LeastSquaresProblem& problem) noexcept;
+
+  /// Forgets the guess.
+  void reset() noexcept { *this = LeastSquares{}; }
+
+ private:
+  struct Guess {
+    int unknowns = 0, inequalities = 0;
+    std::uint32_t at_lower = 0, at_upper = 0, active = 0;
+    UnknownVector x;
+  };
+  Guess guess_;
+};
+
+}  // namespace sigmaik

@@ -1,0 +1,132 @@
+#pragma once
+/// \file limits.hpp
+/// Bounds on the coming cycle's joint velocity, so that position, velocity, acceleration and jerk limits hold now and
+/// can be held for ever, whatever is chosen inside the bounds.
+///
+/// Limits are meant in discrete time, as a robot's controller checks them: with q_k = q_{k−1} + v_k dt they hold for
+/// q_k, v_k, a_k = (v_k − v_{k−1}) / dt and (a_k − a_{k−1}) / dt. Joints do not know of one another.
+///
+/// Without a jerk limit. v may be chosen if the fastest stop after it, v, v − A dt, v − 2 A dt, …, ends inside:
+///
+///     D(v) = Σ_{j≥0} max(v − j A dt, 0) dt ≤ upper − q.
+///
+/// D is convex and piecewise linear, so its inverse is the least of its lines: D⁻¹(d) = min_N d/((N+1) dt) + N A dt/2.
+/// Since D(v) = v dt + D(v − A dt), what was allowed leaves v − A dt allowed in the next cycle; 0 is allowed inside the
+/// limits, from either side. So the windows of position, velocity and acceleration meet pairwise, and three intervals
+/// that meet pairwise have a point in common: there are bounds for ever.
+///
+/// With a jerk limit. The tracker keeps a way to stop: the continuous velocity that starts with the present v and a
+/// slope s and comes to rest in the least time under |v'| ≤ A, |v''| ≤ J.
+///   - Samples of it hold the limits: their differences are means of v' over a cycle, and those change by ≤ J dt a
+///     cycle. The first does too, if |s − a_k| ≤ J dt/2.
+///   - Its later part is the fastest stop from there. So its next sample may always be chosen, with its slope.
+///   - Fastest stops are ordered: of two, the one that starts with no less v and no less s has no less v(t) ever after.
+///     (Where both meet, the lower one would have the larger slope, and could stop only beyond the other.)
+/// So along a line of choices (v, s), both growing, through the next sample of the stop that is kept, those whose own
+/// stop stays inside upper limits reach up to a largest v, and all between have stops inside the lower limits too. That
+/// v is found by bracketing, exactly on the samples: their sums have closed forms. As J → ∞ this is the case above.
+///
+/// Where a limit is broken already (reset() outside it, or too fast to stop before it), acceleration and jerk are held
+/// first, as the motors can do no more, then velocity, then position: each comes back as fast as those before it allow,
+/// and then stays. Leaving a limit is never held back. The bounds are continuous functions of the state; only where a
+/// joint with a jerk limit can stop neither below its upper nor above its lower limit, they meet in the stop.
+
+#include <array>
+#include <cstdint>
+
+#include <sigmaik/chain.hpp>
+#include <sigmaik/types.hpp>
+
+namespace sigmaik {
+
+/// Settings of a LimitTracker.
+struct LimitOptions {
+  double dt = 1e-3;          ///< [s] > 0, from one cycle to the next
+  bool position = true;      ///< which limits are held
+  bool velocity = true;
+  bool acceleration = true;
+  bool jerk = true;
+  /// In (0, 1], of the velocity limit: how fast a joint that is outside its position limits must at least come back.
+  /// Without a velocity limit: its way back, or 1 mm or 1 mrad if that is more, in 0.1 s.
+  double recovery_speed = 0.1;
+};
+
+/// Kind of limit that forms a bound.
+enum class LimitKind : std::int8_t { None, Position, Velocity, Acceleration, Jerk };
+
+/// "none", "position", "velocity", "acceleration", "jerk".
+const char* to_string(LimitKind kind) noexcept;
+
+/// Interval of each joint's velocity. lower ≤ upper; infinite where nothing limits.
+struct VelocityBounds {
+  JointVector lower, upper;  ///< (n,) [rad/s or m/s]
+  std::array<LimitKind, kMaxJoints> lower_kind{}, upper_kind{};
+};
+
+/// Follows the command of an arm, q ← q + q̇ dt, and says before each cycle how fast each joint may go.
+///
+///     LimitTracker tracker(chain.limits(), {.dt = 1e-3});
+///     tracker.reset(q);
+///     each cycle:  qdot = …;  tracker.advance(qdot);  // moves qdot into tracker.bounds()
+class LimitTracker {
+ public:
+  /// \throws Error where an option or a limit is out of its range
+  explicit LimitTracker(const JointLimits& limits, const LimitOptions& options = {});
+
+  /// Starts, or starts again, at q (n,) with q̇ = qdot (n,) and no acceleration; qdot empty: at rest.
+  /// \throws Error where a size is wrong or an entry is not finite
+  void reset(const JointRef& q, const JointRef& qdot = JointVector());
+
+  /// Of the coming cycle; empty before reset().
+  const VelocityBounds& bounds() const noexcept { return bounds_; }
+
+  /// (n,) [rad/s or m/s], inside the bounds: the coming cycle of the fastest stop.
+  const JointVector& stop() const noexcept { return stop_; }
+
+  /// One cycle with q̇ (n,). Entries outside the bounds are moved to the nearest; NaN, or a wrong size, becomes stop().
+  /// Real time.
+  void advance(JointVector& qdot) noexcept;
+
+  /// (n,) [rad or m]: the sum of all cycles. Within rounding of a position limit it is on the limit, never beyond.
+  const JointVector& q() const noexcept { return q_; }
+  /// (n,) [rad/s or m/s], of the last cycle.
+  const JointVector& qdot() const noexcept { return v_; }
+
+  /// Bit i: joint i is outside its position limits.
+  std::uint16_t outside() const noexcept { return outside_; }
+  /// Bit i: joint i is outside its position or velocity limits, or too fast to stop inside them.
+  std::uint16_t recovering() const noexcept { return recovering_; }
+
+  int dof() const noexcept { return n_; }
+  const LimitOptions& options() const noexcept { return options_; }
+
+ private:
+  // Velocities are counted as they are, and all else in velocities and cycles: positions [1/dt], changes of velocity
+  // a cycle, and changes of those.
+  struct Joint {
+    double lower, upper;     // [rad or m]
+    double velocity;         // V
+    double acceleration;     // A dt
+    double braking;          // a hair less, to plan with
+    double jerk;             // J dt²
+    double recovery;         // [rad/s or m/s], infinite without a velocity limit
+    double change = 0.0;     // v_k − v_{k−1}
+    double slope = 0.0;      // of the stop that is kept, a cycle
+    double next_slope = 0.0;  // of the same, a cycle later
+    double next = 0.0;       // its velocity then
+  };
+
+  void update() noexcept;
+  void bound(int i) noexcept;
+  void bound_with_jerk(int i) noexcept;
+
+  LimitOptions options_;
+  double per_dt_;
+  int n_ = 0;
+  std::array<Joint, kMaxJoints> joints_{};
+  JointVector q_, v_, stop_;
+  VelocityBounds bounds_;
+  std::uint16_t outside_ = 0, recovering_ = 0;
+};
+
+}  // namespace sigmaik
