@@ -92,7 +92,7 @@ class ActiveSet {
       // Where nothing moves for long, constraints are taken by index, which cannot cycle (Bland 1977), and only where
       // there is no doubt that it is not rounding that lets them come and go.
       const bool cautious = idle > 12;
-      const double doubt = cautious ? 1e3 : 1.0;
+      const double doubt = idle > 30 ? 1e6 : cautious ? 1e3 : 1.0;
       if (fits) {
         fits = false;
         if (!feasible()) {
@@ -389,7 +389,7 @@ class ActiveSet {
       const double to = part == 1.0 ? goal_[i] : p_.x[i] + step;
       p_.x[i] = std::min(std::max(to, p_.lower[i]), p_.upper[i]);
     }
-    moved = largest > kNear * size_ + rounding_;
+    moved = largest > 1e3 * kNear * size_ + rounding_;
     if (row >= 0) {
       active_ |= 1u << row;
       return false;

@@ -282,8 +282,9 @@ void LimitTracker::advance(JointVector& qdot) noexcept {
       joint.slope = slope_of(v, v_[i], joint.next, joint.next_slope, joint.jerk);
     }
     double q = q_[i] + v * options_.dt;
-    if (q > joint.upper && q <= joint.upper + kSnap * (1.0 + std::abs(q))) q = joint.upper;
-    if (q < joint.lower && q >= joint.lower - kSnap * (1.0 + std::abs(q))) q = joint.lower;
+    const double rounding = kSnap * (1.0 + std::abs(q_[i]));
+    if (q > joint.upper && q <= joint.upper + rounding) q = joint.upper;
+    if (q < joint.lower && q >= joint.lower - rounding) q = joint.lower;
     q_[i] = q;
     v_[i] = qdot[i] = v;
   }

@@ -1,4 +1,5 @@
-// The servo, cycle by cycle, on the shipped arms and on random ones.
+// The servo, cycle by cycle, on the shipped arms and on random ones: rules, starts, fades, postures. What limits do is
+// in test_servo_limits.cpp; here they are off, or far away, or those of velocity alone.
 
 #include <doctest/doctest.h>
 
@@ -75,19 +76,41 @@ bool same(const ServoStep& a, const ServoStep& b) {
          a.limiting_joints == b.limiting_joints && a.achieved_twist == b.achieved_twist;
 }
 
-// What every step must be, whatever was asked.
-void check_step(const Chain& chain, const ServoStep& step, const JointVector& before, double dt) {
+// The rule and nothing else.
+ServoOptions free_options() {
+  ServoOptions options;
+  options.position_limits = options.velocity_limits = options.acceleration_limits = options.jerk_limits = false;
+  return options;
+}
+
+// Velocity limits, by scaling.
+ServoOptions scaled_options() {
+  ServoOptions options = free_options();
+  options.velocity_limits = true;
+  options.on_limit = OnLimit::Scale;
+  return options;
+}
+
+// What every step must be, whatever was asked. Position limits count for joints that are inside.
+void check_step(const Chain& chain, const ServoStep& step, const JointVector& before, const ServoOptions& options) {
   REQUIRE(step.qdot.size() == chain.dof());
   REQUIRE(step.q.size() == chain.dof());
   CHECK(step.qdot.allFinite());
   CHECK(step.q.allFinite());
   CHECK(step.achieved_twist.allFinite());
-  for (int i = 0; i < chain.dof(); ++i) CHECK(std::abs(step.qdot[i]) <= chain.limits().velocity[i]);
-  CHECK(step.q == JointVector(before + dt * step.qdot));
+  const JointLimits& limits = chain.limits();
+  for (int i = 0; i < chain.dof(); ++i) {
+    if (options.velocity_limits) CHECK(std::abs(step.qdot[i]) <= limits.velocity[i]);
+    CHECK(std::abs(step.q[i] - before[i] - options.dt * step.qdot[i]) <= 1e-12 * (1.0 + std::abs(before[i])));
+    if (!options.position_limits || before[i] < limits.lower[i] || before[i] > limits.upper[i]) continue;
+    CHECK(step.q[i] >= limits.lower[i]);
+    CHECK(step.q[i] <= limits.upper[i]);
+  }
   CHECK(step.scale >= 0.0);
   CHECK(step.scale <= 1.0);
-  CHECK((step.scale < 1.0) == (step.status == Status::Limited));
-  CHECK((step.limiting_joints != 0) == (step.status == Status::Limited));
+  if (step.scale < 1.0) CHECK(step.status == Status::Limited);
+  if (step.status == Status::Limited) CHECK(step.limiting_joints != 0);
+  if (options.on_limit == OnLimit::Scale) CHECK((step.limiting_joints != 0) == (step.status == Status::Limited));
 }
 
 }  // namespace
@@ -103,7 +126,9 @@ TEST_CASE("every arm reaches what it can reach") {
       JointVector goal;
       do {
         goal = start;
-        for (int i = 0; i < chain.dof(); ++i) goal[i] += random.uniform(-0.4, 0.4);
+        for (int i = 0; i < chain.dof(); ++i) {
+          goal[i] = std::clamp(goal[i] + random.uniform(-0.4, 0.4), chain.limits().lower[i], chain.limits().upper[i]);
+        }
       } while (singular_ratio(chain, goal) < 0.06);  // to a singular pose it takes its time
       const Pose target = pose(chain, goal);
       ServoOptions options;
@@ -114,7 +139,7 @@ TEST_CASE("every arm reaches what it can reach") {
       ServoStep step;
       for (int cycle = 0; cycle < 2500; ++cycle) {
         step = servo.update(target);
-        check_step(chain, step, before, options.dt);
+        check_step(chain, step, before, options);
         before = step.q;
       }
       CHECK(step.pose_error.head<3>().norm() < 1e-6);
@@ -136,7 +161,7 @@ TEST_CASE("velocity limits: kept without tolerance, by scaling, and the joints n
       if (random.chance(0.3)) limits.velocity[random.integer(0, shipped.dof() - 1)] = kInfinity;
       const Chain chain = shipped.with_limits(limits);
       const Method method = all_methods()[static_cast<std::size_t>(repeat) % all_methods().size()];
-      ServoOptions options;
+      ServoOptions options = scaled_options();
       options.soft_start = 0.0;
       options.gain_linear = options.gain_angular = random.decades(0.0, 2.0);
       Servo servo(chain, method, options);
@@ -147,7 +172,7 @@ TEST_CASE("velocity limits: kept without tolerance, by scaling, and the joints n
         ChainState state;
         update(chain, before, state);
         const ServoStep step = servo.update(target);
-        check_step(chain, step, before, options.dt);
+        check_step(chain, step, before, options);
         CHECK((step.achieved_twist - state.jacobian * step.qdot).norm() < 1e-14 * (1.0 + step.qdot.norm()));
         if (step.status == Status::Limited) {
           ++limited;
@@ -178,9 +203,8 @@ TEST_CASE("one cycle, by the formula: gains, caps, posture and weights") {
   for (const auto& [name, chain] : arms()) {
     for (int repeat = 0; repeat < 40; ++repeat) {
       CAPTURE(name);
-      ServoOptions options;
+      ServoOptions options = free_options();
       options.soft_start = 0.0;
-      options.velocity_limits = false;
       options.gain_linear = random.uniform(0.0, 10.0);
       options.gain_angular = random.uniform(0.0, 10.0);
       options.max_linear_error = random.decades(-2.0, 1.0);
@@ -221,10 +245,9 @@ TEST_CASE("one cycle, by the formula: gains, caps, posture and weights") {
   }
 }
 
-TEST_CASE("without velocity limits nothing is held back") {
+TEST_CASE("without limits nothing is held back") {
   const Chain& chain = arms().at("ufactory_xarm7");
-  ServoOptions options;
-  options.velocity_limits = false;
+  ServoOptions options = free_options();
   options.soft_start = 0.0;
   Servo servo(chain, JParse{}, options);
   Random random(3);
@@ -284,10 +307,9 @@ TEST_CASE("soft start: a pose target's command grows from nothing, a twist's is 
   Random random(6);
   for (const auto& [name, chain] : arms()) {
     CAPTURE(name);
-    ServoOptions soft, hard;
+    ServoOptions soft = free_options(), hard = free_options();
     soft.soft_start = 0.1;
     hard.soft_start = 0.0;
-    soft.velocity_limits = hard.velocity_limits = false;
     const JointVector start = regular_configuration(random, chain);
     const Pose target = pose(chain, regular_configuration(random, chain));
     Servo a(chain, JParse{}, soft), b(chain, JParse{}, hard);
@@ -312,8 +334,7 @@ TEST_CASE("reset with a velocity: the command starts from how the arm moves") {
   Random random(7);
   for (const auto& [name, chain] : arms()) {
     CAPTURE(name);
-    ServoOptions options;
-    options.velocity_limits = false;
+    const ServoOptions options = free_options();
     const JointVector start = regular_configuration(random, chain), moving = 0.3 * random.vector(chain.dof());
     const Pose target = pose(chain, regular_configuration(random, chain));
     for (const bool twist : {false, true}) {
@@ -330,23 +351,24 @@ TEST_CASE("reset with a velocity: the command starts from how the arm moves") {
         CHECK((step.qdot - share * asked - (1.0 - share) * moving).norm() < 1e-6 * (1.0 + asked.norm()));
       }
     }
-    // Not even then are velocity limits broken.
-    Servo limited(chain, JParse{});
+    // Not even then are velocity limits broken, unless the motors cannot brake any faster.
+    const ServoOptions only_velocity = scaled_options();
+    Servo limited(chain, JParse{}, only_velocity);
     limited.reset(start, JointVector(1e3 * moving));
     JointVector before = start;
     for (int cycle = 0; cycle < 200; ++cycle) {
       const ServoStep step = limited.update(target);
-      check_step(chain, step, before, 1e-3);
+      check_step(chain, step, before, only_velocity);
       before = step.q;
     }
   }
 }
 
-TEST_CASE("what is not a pose or a twist is refused, and leaves no trace") {
+TEST_CASE("what is not a pose or a twist is refused, and without limits leaves no trace") {
   Random random(8);
   for (const auto& [name, chain] : arms()) {
     CAPTURE(name);
-    ServoOptions options;
+    ServoOptions options = free_options();
     options.posture_gain = 1.0;
     Servo servo(chain, JParse{}, options), untouched(chain, JParse{}, options);
     const JointVector start = regular_configuration(random, chain);
@@ -437,7 +459,14 @@ TEST_CASE("options out of their range are refused") {
     refuses([bad](ServoOptions& o) { o.posture_gain = bad; });
     refuses([bad](ServoOptions& o) { o.posture_max_speed = bad; });
     refuses([bad](ServoOptions& o) { o.length_scale = bad; });
+    refuses([bad](ServoOptions& o) { o.recovery_speed = bad; });
   }
+  refuses([](ServoOptions& o) { o.recovery_speed = 0.0; });
+  refuses([](ServoOptions& o) { o.recovery_speed = 1.5; });
+  refuses([](ServoOptions& o) {
+    o.task.mask = {true, true, true, false, false, false};
+    o.exact = {false, false, false, true, false, false};
+  });
   refuses([](ServoOptions& o) { o.dt = 0.0; });
   refuses([](ServoOptions& o) { o.dt = kInfinity; });
   refuses([](ServoOptions& o) { o.gain_linear = kInfinity; });
@@ -477,7 +506,7 @@ TEST_CASE("targets that jump: always finite, always within the limits, and reach
         }
         const ServoStep step = servo.update(target);
         REQUIRE(step.status != Status::BadInput);
-        check_step(chain, step, before, options.dt);
+        check_step(chain, step, before, options);
         before = step.q;
       }
     }
@@ -490,7 +519,7 @@ TEST_CASE("out of reach for ten thousand cycles: stretched out, and still") {
     for (int repeat = 0; repeat < 2; ++repeat) {
       CAPTURE(name);
       CAPTURE(repeat);
-      ServoOptions options;
+      ServoOptions options = scaled_options();
       options.dt = 0.004;
       Servo servo(chain, JParse{}, options);
       JointVector before = regular_configuration(random, chain);
@@ -502,7 +531,7 @@ TEST_CASE("out of reach for ten thousand cycles: stretched out, and still") {
       ServoStep step;
       for (int cycle = 0; cycle < 10000; ++cycle) {
         step = servo.update(target);
-        check_step(chain, step, before, options.dt);
+        check_step(chain, step, before, options);
         if (cycle > 9000) {
           late_path += options.dt * step.qdot.norm();
           most_turn = std::max(most_turn, (step.qdot - last).norm());
@@ -539,7 +568,8 @@ TEST_CASE("a start at an exact singularity: what can move does, what cannot says
         if (s.sigma(i) > 0.1 * s.sigma(0)) regular += part * part;
       }
       for (const bool as_pose : {false, true}) {
-        Servo servo(chain, JParse{});
+        const ServoOptions options = scaled_options();  // zero is not inside every arm's limits
+        Servo servo(chain, JParse{}, options);
         servo.reset(zero);
         Pose target = servo.tip();
         target.translation() += 0.05 * unit.head<3>();
@@ -549,7 +579,7 @@ TEST_CASE("a start at an exact singularity: what can move does, what cannot says
         double progress = 0.0;
         for (int cycle = 0; cycle < 100; ++cycle) {
           const ServoStep step = as_pose ? servo.update(target) : servo.update_twist(0.05 * unit);
-          check_step(chain, step, before, 1e-3);
+          check_step(chain, step, before, options);
           CHECK(step.status != Status::BadInput);
           CHECK(step.status != Status::Holding);
           damped = damped || step.status == Status::Damped;
@@ -589,7 +619,7 @@ TEST_CASE("every rule, at every arm's zero pose: finite, within the limits, the 
       JointVector before = zero;
       for (int cycle = 0; cycle < 500; ++cycle) {
         const ServoStep step = first.update(target);
-        check_step(chain, step, before, 1e-3);
+        check_step(chain, step, before, ServoOptions{});
         REQUIRE(same(step, second.update(target)));
         before = step.q;
       }
@@ -602,7 +632,7 @@ TEST_CASE("twists are exact away from singularities") {
     Random random(13);
     for (int repeat = 0; repeat < 20; ++repeat) {
       CAPTURE(name);
-      Servo servo(chain, JParse{0.01});
+      Servo servo(chain, JParse{0.01}, scaled_options());
       servo.reset(regular_configuration(random, chain));
       const Pose start = servo.tip();
       const Twist twist = 0.02 * random.unit(6);
@@ -626,7 +656,9 @@ TEST_CASE("zero commands: nothing moves, and that is as asked") {
   Random random(14);
   for (const auto& [name, chain] : arms()) {
     for (const Method& method : all_methods()) {
-      Servo servo(chain, method);
+      ServoOptions options;
+      options.position_limits = false;  // from outside it would come back
+      Servo servo(chain, method, options);
       servo.reset(random.chance(0.5) ? JointVector(JointVector::Zero(chain.dof())) : regular_configuration(random, chain));
       const ServoStep step = servo.update_twist(Twist::Zero());
       CHECK(step.qdot.isZero(0.0));
@@ -750,7 +782,7 @@ TEST_CASE("the error shrinks cycle by cycle") {
     Random random(18);
     for (int repeat = 0; repeat < 5; ++repeat) {
       CAPTURE(name);
-      ServoOptions options;
+      ServoOptions options = scaled_options();
       options.max_linear_error = options.max_angular_error = kInfinity;
       Servo servo(chain, JParse{}, options);
       servo.reset(regular_configuration(random, chain));
@@ -793,8 +825,7 @@ TEST_CASE("targets and twists beyond all measure") {
       for (const bool limits : {true, false}) {
         CAPTURE(name);
         CAPTURE(sigmaik::name(method));
-        ServoOptions options;
-        options.velocity_limits = limits;
+        ServoOptions options = limits ? ServoOptions{} : free_options();
         options.soft_start = 0.0;
         if (random.chance(0.3)) options.dt = 1e10;
         if (random.chance(0.3)) options.max_linear_error = kInfinity;
@@ -804,12 +835,17 @@ TEST_CASE("targets and twists beyond all measure") {
           CAPTURE(size);
           Pose target = Pose::Identity();
           target.translation()[random.integer(0, 2)] = random.chance(0.5) ? size : -size;
-          for (const ServoStep& step : {servo.update(target), servo.update_twist(Twist::Constant(size))}) {
+          for (const bool twist : {false, true}) {
+            const double before = servo.qdot().cwiseAbs().maxCoeff();
+            const ServoStep step = twist ? servo.update_twist(Twist::Constant(size)) : servo.update(target);
             CHECK(step.q.allFinite());
             CHECK(step.qdot.allFinite());
             CHECK(step.achieved_twist.allFinite());
             CHECK(step.pose_error.allFinite());
-            if (step.status == Status::BadInput) CHECK(step.qdot.isZero(0.0));
+            if (step.status == Status::BadInput) {
+              CHECK(step.qdot.cwiseAbs().maxCoeff() <= before);
+              if (!limits) CHECK(step.qdot.isZero(0.0));
+            }
           }
           CHECK(servo.q().allFinite());
         }
@@ -818,7 +854,7 @@ TEST_CASE("targets and twists beyond all measure") {
   }
   // Far away is far away: the arm goes there as fast as to any target out of reach.
   const Chain& chain = arms().at("ufactory_xarm7");
-  ServoOptions options;
+  ServoOptions options = scaled_options();
   options.soft_start = 0.0;
   const JointVector start = regular_configuration(random, chain);
   VectorXd near;
@@ -838,7 +874,7 @@ TEST_CASE("targets and twists beyond all measure") {
 TEST_CASE("the rule may be changed on the way; a copy goes on by itself") {
   Random random(21);
   const Chain& chain = arms().at("franka_panda");
-  Servo servo(chain, JParse{});
+  Servo servo(chain, JParse{}, free_options());
   servo.reset(regular_configuration(random, chain));
   const Pose target = pose(chain, regular_configuration(random, chain));
   for (int cycle = 0; cycle < 50; ++cycle) servo.update(target);

@@ -1,0 +1,460 @@
+// ConstrainedIk against Schreiber, Otter and Hirzinger's equations, and against what it promises: limits held, the exact
+// part exact, the rest as well as can be, time scaling, torques, and the closed form where it will do.
+
+#include <doctest/doctest.h>
+
+#include <cmath>
+#include <limits>
+#include <map>
+#include <string>
+
+#include <Eigen/QR>
+#include <sigmaik/constrained_ik.hpp>
+#include <sigmaik/error.hpp>
+#include <sigmaik/pose.hpp>
+
+#include "random.hpp"
+
+using namespace sigmaik;
+using test::MatrixXd;
+using test::Random;
+using test::VectorXd;
+
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+Chain arm(const std::string& name) { return Chain::from_urdf(SIGMAIK_ROBOTS_DIR "/" + name + ".urdf"); }
+
+JointVector middle(const Chain& chain) {
+  JointVector q(chain.dof());
+  for (int i = 0; i < chain.dof(); ++i) {
+    const double low = std::max(chain.limits().lower[i], -3.0), high = std::min(chain.limits().upper[i], 3.0);
+    q[i] = 0.5 * (low + high) + 0.1 * (high - low) * (i % 2 == 0 ? 1.0 : -1.0);
+  }
+  return q;
+}
+
+Pose moved(const Pose& from, const Twist& by) {
+  Pose to = from;
+  to.translation() += by.head<3>();
+  to.linear() = rotation_exp(by.tail<3>()) * from.linear();
+  return to;
+}
+
+ConstrainedIkOptions unlimited() {
+  ConstrainedIkOptions o;
+  o.position_limits = o.velocity_limits = o.acceleration_limits = o.jerk_limits = false;
+  o.analytic = false;
+  return o;
+}
+
+MatrixXd rows_of(const std::array<bool, 6>& mask, bool value, const MatrixXd& m) {
+  MatrixXd out(6, m.cols());
+  int row = 0;
+  for (std::size_t i = 0; i < 6; ++i) {
+    if (mask[i] == value) out.row(row++) = m.row(static_cast<Eigen::Index>(i));
+  }
+  return out.topRows(row);
+}
+
+// min |A x − b| where C x = d, by the null space of C.
+VectorXd constrained(const MatrixXd& A, const VectorXd& b, const MatrixXd& C, const VectorXd& d) {
+  if (C.rows() == 0) return A.completeOrthogonalDecomposition().solve(b);
+  const auto orthogonal = C.transpose().fullPivHouseholderQr();
+  const MatrixXd Q = orthogonal.matrixQ();
+  const MatrixXd Z = Q.rightCols(C.cols() - orthogonal.rank());
+  const VectorXd x = C.completeOrthogonalDecomposition().solve(d);
+  if (A.rows() == 0 || Z.cols() == 0) return x;
+  return x + Z * MatrixXd(A * Z).completeOrthogonalDecomposition().solve(b - A * x);
+}
+
+}  // namespace
+
+TEST_CASE("one linearisation is equation (25) with (26), whatever is exact, weighed, and in which axes") {
+  Random random(1);
+  int compared = 0;
+  for (int repeat = 0; repeat < 3000; ++repeat) {
+    const Chain chain = random.chain(random.integer(2, 9), 0.1);
+    const int n = chain.dof();
+    ConstrainedIkOptions o = unlimited();
+    o.iterations = 1;
+    o.dt = random.decades(-3, -1);
+    o.task.frame = random.chance(0.5) ? Frame::Base : Frame::Tool;
+    for (bool& row : o.exact) row = random.chance(0.4);
+    for (int i = 0; i < 6; ++i) {
+      o.alpha[i] = random.decades(-1, 1);
+      o.beta[i] = random.chance(0.2) ? 0.0 : random.decades(-1, 1);
+    }
+    const bool scaled = random.chance(0.5);
+    if (scaled) o.gamma = random.decades(-1, 1);
+    ConstrainedIk ik(chain, o);
+    const JointVector q = random.configuration(n);
+    ik.reset(q);
+    const Pose target = moved(ik.tip(), 0.3 * Twist(random.vector(6)));
+    const ConstrainedIkStep step = ik.step(target);
+
+    ChainState state;
+    update(chain, q, state);
+    MatrixXd axes = MatrixXd::Identity(6, 6);
+    if (o.task.frame == Frame::Tool) {
+      axes.topLeftCorner(3, 3) = axes.bottomRightCorner(3, 3) = state.tip.linear().transpose();
+    }
+    // The Jacobian of the error by differences: the rotation's part is not the geometric one.
+    const Twist error = -pose_error(state.tip, target);
+    MatrixXd slope(6, n);
+    for (int j = 0; j < n; ++j) {
+      constexpr double h = 1e-6;
+      JointVector up = q, down = q;
+      up[j] += h;
+      down[j] -= h;
+      slope.col(j) = (pose_error(pose(chain, down), target) - pose_error(pose(chain, up), target)) / (2.0 * h);
+    }
+    const Twist motion = pose_error(state.tip, target);  // the first step starts at the tip
+    const int unknowns = n + (scaled ? 1 : 0);
+    const auto exact = [&](const MatrixXd& m) { return rows_of(o.exact, true, axes * m); };
+    const auto rest = [&](const MatrixXd& m) { return rows_of(o.exact, false, axes * m); };
+    const VectorXd alpha = rows_of(o.exact, false, o.alpha), beta = rows_of(o.exact, false, o.beta);
+    const auto ap = alpha.size();
+    MatrixXd A = MatrixXd::Zero(2 * ap + (scaled ? 1 : 0), unknowns);
+    VectorXd b = VectorXd::Zero(A.rows());
+    A.topLeftCorner(ap, n) = alpha.asDiagonal() * rest(slope);
+    b.head(ap) = alpha.asDiagonal() * rest(-error);
+    A.block(ap, 0, ap, n) = beta.asDiagonal() * rest(state.jacobian);
+    b.segment(ap, ap) = beta.asDiagonal() * rest(motion);
+    MatrixXd C = MatrixXd::Zero(6 - ap, unknowns);
+    C.leftCols(n) = exact(slope);
+    const VectorXd d = -exact(error);
+    // Motion from the tip to the target changes the error by −error exactly: J_l⁻¹(φ) maps it onto itself.
+    if (scaled) {
+      A.col(n).head(ap) = alpha.asDiagonal() * rest(motion);
+      C.col(n) = exact(motion);
+      A(2 * ap, n) = *o.gamma;
+    }
+    const VectorXd x = constrained(A, b, C, d);
+    if (scaled && (x[n] < 1e-6 || x[n] > 1.0 - 1e-6)) continue;  // its bounds are another test's
+    const auto conditioned = [](const MatrixXd& m, double least) {
+      if (m.rows() == 0) return true;
+      const VectorXd sigma = Eigen::JacobiSVD<MatrixXd>(m).singularValues();
+      return sigma.minCoeff() > least * sigma.maxCoeff();
+    };
+    const MatrixXd all = (MatrixXd(A.rows() + C.rows(), unknowns) << A, C).finished();
+    if (!conditioned(C, 1e-2) || !conditioned(all, 1e-3)) continue;  // differences are not exact enough
+    ++compared;
+    CHECK((step.qdot * o.dt - x.head(n)).norm() < 1e-5 * (1.0 + x.norm()));
+    if (scaled) CHECK(step.time_scale == doctest::Approx(x[n]).epsilon(1e-5));
+    CHECK(step.used == IkSource::Optimised);
+    CHECK(step.active == 0);
+  }
+  CHECK(compared > 500);
+}
+
+TEST_CASE("without the error's rate and limits, iterations are Newton's: quadratic to a pose that can be reached") {
+  Random random(2);
+  for (const std::string name : {"kuka_kr6_r900", "ufactory_xarm7", "franka_panda", "ur10", "puma560"}) {
+    const Chain chain = arm(name);
+    for (int repeat = 0; repeat < 50; ++repeat) {
+      CAPTURE(name);
+      ConstrainedIkOptions o = unlimited();
+      o.beta.setZero();
+      o.iterations = 8;
+      for (bool& row : o.exact) row = random.chance(0.5);
+      ConstrainedIk ik(chain, o);
+      JointVector q = middle(chain), goal = q;
+      for (int i = 0; i < chain.dof(); ++i) goal[i] += random.uniform(-0.15, 0.15);
+      ik.reset(q);
+      const ConstrainedIkStep step = ik.step(pose(chain, goal));
+      CHECK(step.error.norm() < 1e-9);
+      CHECK(step.status == Status::Ok);
+      CHECK(step.exact_met);
+    }
+  }
+}
+
+TEST_CASE("a rotation of nearly half a turn converges as fast as a small one") {
+  Random random(3);
+  const Chain chain = arm("ufactory_xarm7");
+  ConstrainedIkOptions o = unlimited();
+  o.beta.setZero();
+  o.iterations = 1;
+  o.exact = {};
+  o.task.mask = {false, false, false, true, true, true};
+  for (int repeat = 0; repeat < 50; ++repeat) {
+    ConstrainedIk ik(chain, o);
+    ik.reset(middle(chain));
+    Twist by = Twist::Zero();
+    by.tail<3>() = 0.02 * Eigen::Vector3d(random.unit(3));
+    const Pose near = moved(ik.tip(), by);
+    const double small = ik.step(near).error.tail<3>().norm();
+    CHECK(small < 5e-4);
+  }
+}
+
+TEST_CASE("errors decay by β²/(α²+β²) a cycle, and the exact part is exact at once") {
+  const Chain chain = arm("kuka_kr6_r900");
+  for (const double beta : {0.0, 1.0, 5.0}) {
+    ConstrainedIkOptions o = unlimited();
+    o.beta.setConstant(beta);
+    ConstrainedIk ik(chain, o);
+    ik.reset(middle(chain));
+    Twist by = Twist::Zero();
+    by << 0.0, 0.0, 0.0, 1e-3, -2e-3, 1e-3;
+    const Pose target = moved(ik.tip(), by);
+    ik.step(target);  // the first step's motion is the whole way, so nothing is left
+    ConstrainedIkStep step = ik.step(target);
+    CHECK(step.error.norm() < 1e-5);
+    // A start off the target that is not the target's motion: hold the old target, then let the arm be elsewhere.
+    ConstrainedIkOptions tight = o;
+    tight.velocity_limits = true;
+    JointLimits limits = chain.limits();
+    limits.velocity.setConstant(0.05);
+    ConstrainedIk held(chain.with_limits(limits), tight);
+    held.reset(middle(chain));
+    const Pose far = moved(held.tip(), 10.0 * by);
+    double last = kInfinity;
+    const double decay = beta * beta / (1.0 + beta * beta);
+    int free = 0;
+    for (int i = 0; i < 4000; ++i) {
+      step = held.step(far);
+      CHECK(step.error.head<3>().norm() < 1e-6);
+      const double error = step.error.tail<3>().norm();
+      if (step.active == 0 && last < kInfinity && last > 1e-7) {
+        ++free;
+        CHECK(error == doctest::Approx(decay * last).epsilon(0.02).scale(1e-8));
+      }
+      last = step.active == 0 ? error : kInfinity;
+    }
+    CHECK(last < 1e-7);
+    if (beta > 0.0) CHECK(free > 5);
+  }
+}
+
+TEST_CASE("limits hold, the answer is never missing, and what is exact gives way last") {
+  Random random(4);
+  for (const std::string name : {"kuka_kr6_r900", "ufactory_xarm7", "franka_panda", "comau_racer_7_1_4"}) {
+    const Chain chain = arm(name);
+    const JointLimits& limits = chain.limits();
+    for (int episode = 0; episode < 12; ++episode) {
+      CAPTURE(name);
+      CAPTURE(episode);
+      ConstrainedIkOptions o;
+      o.dt = 0.004;
+      o.analytic = random.chance(0.5);
+      if (random.chance(0.5)) o.gamma = random.decades(-2, 1);
+      if (random.chance(0.5)) o.max_error.tail<3>().setConstant(0.05);
+      ConstrainedIk ik(chain, o);
+      ik.reset(middle(chain));
+      JointVector q = ik.q(), qdot = JointVector::Zero(chain.dof());
+      Pose target = ik.tip();
+      for (int cycle = 0; cycle < 600; ++cycle) {
+        if (cycle % 100 == 0) target = moved(target, 0.5 * Twist(random.vector(6)));
+        const ConstrainedIkStep step = ik.step(target);
+        REQUIRE(step.status != Status::BadInput);
+        REQUIRE(step.q.allFinite());
+        CHECK(step.time_scale >= 0.0);
+        CHECK(step.time_scale <= 1.0);
+        if (!o.gamma) CHECK(step.time_scale == 0.0);
+        for (int i = 0; i < chain.dof(); ++i) {
+          CHECK(step.q[i] >= limits.lower[i]);
+          CHECK(step.q[i] <= limits.upper[i]);
+          CHECK(std::abs(step.qdot[i]) <= limits.velocity[i] * (1.0 + 1e-9));
+          CHECK(std::abs(step.qdot[i] - qdot[i]) / o.dt <= limits.acceleration[i] * (1.0 + 1e-9));
+          CHECK(std::abs(step.q[i] - q[i] - o.dt * step.qdot[i]) < 1e-11);
+        }
+        CHECK((step.error + pose_error(pose(chain, step.q), target)).norm() < 1e-12);
+        q = step.q;
+        qdot = step.qdot;
+      }
+    }
+  }
+}
+
+TEST_CASE("time scaling: none where none is needed; all six rows exact: the path kept by slowing down") {
+  const Chain chain = arm("kuka_kr6_r900");
+  ConstrainedIkOptions o;
+  o.dt = 0.004;
+  o.gamma = 1.0;
+  o.exact.fill(true);
+  o.analytic = false;
+  // How fast the path can be taken further on is not known to a step, so with these it may be too fast to brake.
+  o.acceleration_limits = false;
+  ConstrainedIk ik(chain, o);
+  JointVector home(6);
+  home << 0.0, -1.3, 1.5, 0.3, 0.5, 0.0;
+  ik.reset(home);
+  const Pose start = ik.tip();
+  // A line of a second in 20 ms: the caller advances its clock by (1 − ϑ) dt.
+  const auto line = [&](double t) {
+    Twist by = Twist::Zero();
+    by[1] = 0.25 * (1.0 - std::cos(std::min(t, 1.0) * M_PI));
+    return moved(start, by);
+  };
+  double t = 0.0, most = 0.0;
+  int cycles = 0;
+  while (t < 1.0 - 1e-9 && cycles < 5000) {
+    const double next = std::min(t + 0.2, 1.0);
+    const ConstrainedIkStep step = ik.step(line(next));
+    t += (1.0 - step.time_scale) * (next - t);
+    most = std::max(most, step.time_scale);
+    CHECK(step.path_error.head<3>().norm() < 2e-5);
+    CHECK(step.path_error.tail<3>().norm() < 2e-5);
+    CHECK(std::abs(step.error[0]) < 1e-4);  // off the line
+    ++cycles;
+  }
+  CHECK(most > 0.5);
+  CHECK(cycles > 40);
+  CHECK(cycles < 5000);
+
+  ConstrainedIk slow(chain, o);
+  slow.reset(home);
+  for (int i = 0; i < 200; ++i) {
+    const ConstrainedIkStep step = slow.step(line(1e-3 * i));
+    CHECK(step.time_scale < 1e-12);
+    CHECK(step.error.norm() < 1e-6);
+  }
+}
+
+TEST_CASE("the largest error allowed is kept where it can be") {
+  const Chain chain = arm("kuka_kr6_r900");
+  JointLimits limits = chain.limits();
+  limits.velocity.setConstant(0.5);
+  ConstrainedIkOptions o;
+  o.dt = 0.004;
+  o.analytic = false;
+  o.gamma = 0.1;
+  o.max_error.tail<3>().setConstant(0.01);
+  ConstrainedIk ik(chain.with_limits(limits), o);
+  JointVector home(6);
+  home << 0.0, -1.3, 1.5, 0.0, 0.15, 0.0;
+  ik.reset(home);
+  const Pose start = ik.tip();
+  int active = 0;
+  double t = 0.0;
+  for (int i = 0; i < 1500; ++i) {
+    Twist by = Twist::Zero();
+    const double next = t + o.dt;
+    by[1] = 0.3 * std::sin(next) * std::sin(next);
+    const ConstrainedIkStep step = ik.step(moved(start, by));
+    t += (1.0 - step.time_scale) * o.dt;
+    active += step.error_active;
+    if (step.exact_met && step.status != Status::BadInput) {
+      CHECK(step.path_error.tail<3>().cwiseAbs().maxCoeff() < 0.01 * 1.05);  // kept to the linearisation's error
+    }
+  }
+  CHECK(active > 50);
+}
+
+TEST_CASE("torque limits are the dynamics', and come before the exact part") {
+  const Chain chain = arm("franka_panda");
+  JointLimits limits = chain.limits();
+  limits.acceleration.setConstant(kInfinity);
+  limits.effort << 60, 60, 40, 40, 8, 8, 8;
+  ConstrainedIkOptions o;
+  o.dt = 0.002;
+  o.torque_limits = true;
+  const Chain weak = chain.with_limits(limits);
+  ConstrainedIk ik(weak, o);
+  JointVector home(7);
+  home << 0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785;
+  ik.reset(home);
+  Dynamics dynamics(weak);
+  const Pose start = ik.tip();
+  JointVector q = home, qdot = JointVector::Zero(7);
+  int active = 0, broken = 0;
+  for (int i = 0; i < 1500; ++i) {
+    Twist by = Twist::Zero();
+    const double t = o.dt * i;
+    by.head<3>() << 0.1 * std::sin(4.0 * t), 0.15 * std::sin(3.0 * t), 0.1 * std::sin(5.0 * t);
+    const ConstrainedIkStep step = ik.step(moved(start, by));
+    const VectorXd torque = dynamics.mass_matrix(q) * VectorXd((step.qdot - qdot) / o.dt) +
+                            dynamics.coriolis(q, qdot) + dynamics.gravity(q);
+    const double share = (torque.cwiseAbs().cwiseQuotient(VectorXd(limits.effort))).maxCoeff();
+    active += step.torque_active;
+    if (share > 1.0 + 1e-6) {
+      ++broken;
+      CHECK(step.status == Status::Limited);
+    }
+    q = step.q;
+    qdot = step.qdot;
+  }
+  CHECK(active > 20);
+  CHECK(broken == 0);
+}
+
+TEST_CASE("closed form while it is inside the limits, optimised where it is not, and back") {
+  const Chain chain = arm("kuka_kr6_r900");
+  ConstrainedIkOptions o;
+  o.dt = 0.004;
+  ConstrainedIk ik(chain, o);
+  REQUIRE(ik.has_analytic());
+  JointVector home(6);
+  home << 0.0, -1.3, 1.5, 0.0, 0.005, 0.0;
+  ik.reset(home);
+  const Pose start = ik.tip();
+  std::map<IkSource, int> used;
+  int switches = 0;
+  IkSource last = IkSource::Analytic;
+  for (int i = 0; i < 2000; ++i) {
+    Twist by = Twist::Zero();
+    by[1] = 0.15 * (1.0 - std::cos(2.0 * o.dt * i));
+    const ConstrainedIkStep step = ik.step(moved(start, by));
+    ++used[step.used];
+    switches += step.used != last;
+    last = step.used;
+    if (step.used == IkSource::Analytic) {
+      CHECK(step.status == Status::Ok);
+      CHECK(step.error.norm() < 1e-9);
+      CHECK(step.active == 0);
+    }
+  }
+  CHECK(used[IkSource::Analytic] > 500);
+  CHECK(used[IkSource::Optimised] > 5);
+  CHECK(switches >= 2);
+  CHECK(switches < 40);
+  CHECK(last == IkSource::Analytic);
+  CHECK_FALSE(ConstrainedIk(arm("ur10")).has_analytic());
+}
+
+TEST_CASE("bad targets stop the arm; bad options are refused with the facts") {
+  const Chain chain = arm("kuka_kr6_r900");
+  ConstrainedIk ik(chain);
+  Pose nonsense = Pose::Identity();
+  CHECK(ik.step(nonsense).status == Status::BadInput);  // before reset()
+  JointVector home(6), qdot = JointVector::Constant(6, 0.5);
+  home << 0.0, -1.3, 1.5, 0.0, 0.5, 0.0;
+  ik.reset(home, qdot);
+  nonsense.translation()[1] = std::nan("");
+  for (int i = 0; i < 200; ++i) {
+    const ConstrainedIkStep step = ik.step(nonsense);
+    CHECK(step.status == Status::BadInput);
+    for (int j = 0; j < 6; ++j) {
+      CHECK(std::abs(step.qdot[j] - qdot[j]) <= chain.limits().acceleration[j] * 1e-3 * (1.0 + 1e-9));
+    }
+    qdot = step.qdot;
+  }
+  CHECK(qdot.isZero(0.0));
+
+  const auto refused = [&](auto change, const std::string& fact, const char* name = "kuka_kr6_r900") {
+    ConstrainedIkOptions o;
+    change(o);
+    std::string text = "accepted";
+    try {
+      ConstrainedIk refused_one(arm(name), o);
+    } catch (const Error& e) {
+      text = e.what();
+    }
+    CAPTURE(text);
+    CHECK(text.find(fact) != std::string::npos);
+  };
+  refused([](auto& o) { o.dt = 0.0; }, "dt");
+  refused([](auto& o) { o.alpha[4] = -1.0; }, "ωy");
+  refused([](auto& o) { o.beta[3] = kInfinity; }, "ωx");
+  refused([](auto& o) { o.alpha[5] = o.beta[5] = 0.0; }, "ωz");
+  refused([](auto& o) { o.gamma = 0.0; }, "gamma");
+  refused([](auto& o) { o.gamma = std::nan(""); }, "gamma");
+  refused([](auto& o) { o.max_error[0] = 0.0; }, "max_error");
+  refused([](auto& o) { o.iterations = 0; }, "iterations");
+  refused([](auto& o) { o.task.mask = {}; }, "mask");
+  refused([](auto& o) { o.torque_limits = true; }, "inertia");
+  refused([](auto& o) { o.recovery_speed = 0.0; }, "recovery_speed");
+}
