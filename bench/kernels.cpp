@@ -9,6 +9,7 @@
 #include <kdl/chainiksolvervel_wdls.hpp>
 #include <kdl/chainjnttojacsolver.hpp>
 
+#include <sigmaik/constrained_ik.hpp>
 #include <sigmaik/kdl.hpp>
 
 #include "scene.hpp"
@@ -227,6 +228,57 @@ void analytic_ik_nearest(benchmark::State& state) {
   }
 }
 BENCHMARK(analytic_ik_nearest);
+
+// Limits -------------------------------------------------------------------------------------------------------------
+
+// A twist that changes faster and further than the arm can, so that limits are active in most cycles.
+template <sigmaik::OnLimit kOnLimit>
+void servo_limited(benchmark::State& state) {
+  const Scene& s = scene();
+  sigmaik::Servo servo(s.arm, sigmaik::JParse{}, {.on_limit = kOnLimit});
+  servo.reset(s.q[0]);
+  int i = 0, held = 0, limited = 0;
+  for (auto _ : state) {
+    sigmaik::Twist twist = 8.0 * s.twist;
+    const double phase = 2.0 * M_PI * i++ / 500.0;
+    twist.head<3>() *= std::sin(phase);
+    twist.tail<3>() *= std::cos(1.3 * phase);
+    const sigmaik::ServoStep step = servo.update_twist(twist);
+    held += std::popcount(step.limiting_joints);
+    limited += step.limiting_joints != 0;
+    benchmark::DoNotOptimize(step.qdot.data());
+  }
+  state.counters["held"] = held / static_cast<double>(i);
+  state.counters["limited"] = limited / static_cast<double>(i);
+}
+BENCHMARK(servo_limited<sigmaik::OnLimit::Redistribute>)->Name("servo_redistribute");
+BENCHMARK(servo_limited<sigmaik::OnLimit::Scale>)->Name("servo_scale");
+
+// The KUKA back and forth across its wrist's singularity, with two iterations and limits active much of the time.
+template <bool kAnalytic>
+void constrained_ik(benchmark::State& state) {
+  const sigmaik::Chain arm = sigmaik::Chain::from_urdf(std::string(SIGMAIK_ROBOTS_DIR) + "/kuka_kr6_r900.urdf");
+  sigmaik::ConstrainedIkOptions options;
+  options.analytic = kAnalytic;
+  sigmaik::ConstrainedIk ik(arm, options);
+  JointVector home(6);
+  home << 0.0, -1.3, 1.5, 0.0, 0.005, 0.0;
+  ik.reset(home);
+  const sigmaik::Pose start = ik.tip();
+  std::vector<sigmaik::Pose> path(kPath, start);
+  for (int k = 0; k < kPath; ++k) path[static_cast<std::size_t>(k)].translation()[1] += 0.1 * std::sin(2.0 * M_PI * k / kPath);
+  int i = 0, held = 0, optimised = 0;
+  for (auto _ : state) {
+    const sigmaik::ConstrainedIkStep step = ik.step(path[static_cast<std::size_t>(i++ & (kPath - 1))]);
+    held += step.active != 0;
+    optimised += step.used == sigmaik::IkSource::Optimised;
+    benchmark::DoNotOptimize(step.qdot.data());
+  }
+  state.counters["limited"] = held / static_cast<double>(i);
+  state.counters["optimised"] = optimised / static_cast<double>(i);
+}
+BENCHMARK(constrained_ik<false>)->Name("constrained_ik_step");
+BENCHMARK(constrained_ik<true>)->Name("constrained_ik_step_switching");
 
 }  // namespace
 

@@ -173,6 +173,12 @@ def main() -> int:
         if row["name"] in goals and "ratio" in row:
             rows.append((f"servo.update(pose) from Python / {row['name']}, {row['p50_us']:.0f} µs",
                          f"{ours['p50_us']:.2f} µs", row["ratio"], goals[row["name"]]))  # fmt: skip
+    if "constrained_eiquadprog" in ns:
+        for name, text in (("constrained_sigmaik", "warm"), ("constrained_sigmaik_cold", "cold")):
+            rows.append((f"least_squares, 7 unknowns, 3 eq., box, {text} / eiquadprog, {cpu('constrained_eiquadprog'):.0f} ns",
+                         f"{cpu(name):.0f} ns", cpu("constrained_eiquadprog") / cpu(name), 1.5))  # fmt: skip
+    rows.append(("ConstrainedIk::step, 2 iterations, optimised / KDL's wdls",
+                 f"{cpu('constrained_ik_step'):.0f} ns", cpu("velocity_kdl_wdls") / cpu("constrained_ik_step"), 0.75))  # fmt: skip
     one, two = (float(ns[f"batch/65536/{threads}"]["items_per_second"]) for threads in (1, 2))
     rows.append(("solve_batch, 6×7 random, million solves / (s core)", f"{one / 1e6:.2f}", one / 1e6, 0.6))
     rows.append(("solve_batch, two threads / one", f"{two / 1e6:.2f}", two / one, 1.9))
@@ -180,9 +186,16 @@ def main() -> int:
     for figure, value, ratio, goal in rows:
         met = ratio <= goal if "at most" in figure else ratio >= goal
         print(f"{figure:62} {value:>10} {ratio:7.2f} {goal:6.1f} {'' if met else 'missed'}")
-    for name in ("qp_eiquadprog", "qp_proxsuite"):
+    for name in ("velocity_eiquadprog", "velocity_proxsuite", "constrained_eiquadprog", "constrained_proxsuite"):
         if name in ns:
-            print(f"{name + ', the velocity problem with speed limits, for comparison':62} {cpu(name):7.0f} ns")
+            print(f"{name + ', for comparison':62} {cpu(name):7.0f} ns")
+    for name in ("servo_redistribute", "servo_scale", "constrained_ik_step_switching", "analytic_ik_solve", "analytic_ik_nearest"):
+        print(f"{name:62} {cpu(name):7.0f} ns")
+    run = subprocess.run([sys.executable, ROOT / "bench" / "daqp_constrained.py"], capture_output=True, text=True)
+    if run.returncode == 0:
+        result["daqp"] = json.loads(run.stdout)
+        print(f"{'constrained, DAQP, set-up and solve by its own clock':62} {result['daqp']['set_up_ns']:7.0f} ns + "
+              f"{result['daqp']['solve_ns']:.0f} ns")  # fmt: skip
     if result["instructions"]:
         print(f"{'instructions of Servo::update, baseline instruction set':62} {result['instructions']:10.0f}")
     result["table"] = rows

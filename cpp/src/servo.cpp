@@ -178,6 +178,7 @@ ServoStep Servo::resolve(const Twist& twist, bool fade) noexcept {
       redistribute(step);
     }
   }
+  if (!(tracker_.q() + options_.dt * step.qdot).allFinite()) return stop(Status::BadInput);  // too far for numbers
   take(step);
   return step;
 }
