@@ -40,7 +40,7 @@ void bind_constrained_ik(py::module_& m) {
       .def_property_readonly("active", [](const ConstrainedIkStep& s) { return indices(s.active); },
                              "Indices of the joints of which a limit is active.")
       .def_readonly("torque_active", &ConstrainedIkStep::torque_active, "A torque limit is active, or cannot be met.")
-      .def_readonly("error_active", &ConstrainedIkStep::error_active, "max_error is active, or cannot be met.")
+      .def_readonly("error_active", &ConstrainedIkStep::error_active, "max_error is active, or has been let go.")
       .def_readonly("exact_met", &ConstrainedIkStep::exact_met, "The exact part's equations hold.")
       .def_property_readonly("used", [](const ConstrainedIkStep& s) { return std::string(to_string(s.used)); },
                              "'analytic' or 'optimised'")
@@ -92,9 +92,11 @@ void bind_constrained_ik(py::module_& m) {
            "dt: [s] from one step to the next.\n"
            "exact: (6,) truth values: rows (vx, vy, vz, ωx, ωy, ωz) met exactly; the others as well as limits allow.\n"
            "alpha, beta: a number or (6,): weights of the error and of its change in a cycle. Free of limits an error\n"
-           "    decays by the factor β²/(α²+β²) a cycle; with β = 0 the joints may oscillate.\n"
+           "    decays by the factor β²/(α²+β²) a cycle (5 √(1 ms/dt) makes that 25 ms at any dt); with β = 0 the joints\n"
+           "    may oscillate.\n"
            "gamma: weight of the time scaling ϑ; None: the target is not slowed down.\n"
-           "max_error: a number or (6,) [m, rad], largest error of the approximate rows; None: any.\n"
+           "max_error: a number or (6,) [m, rad], largest error of the approximate rows, each for itself; let go where\n"
+           "    it cannot be had together with the exact part; None: any.\n"
            "iterations: linearisations a step. torque_limits: hold the chain's efforts, with its inertias and\n"
            "`gravity` (3,) [m/s²]; the closed form is not used then.\n"
            "analytic: use the closed form where the chain has one and its answer is inside the limits.\n"

@@ -16,6 +16,7 @@ using detail::require;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kMet = 1e-9;  // [m, rad] an error this small is none
+constexpr double kAgree = 0.01;  // of the width of a joint's bounds: velocities this close are the same
 
 LimitOptions limit_options(const ConstrainedIkOptions& options) {
   LimitOptions out;
@@ -43,6 +44,17 @@ Eigen::Matrix3d inverse_left_jacobian(const Eigen::Vector3d& phi) noexcept {
   const double half = 0.5 * angle;
   const double c = angle < 1e-4 ? 1.0 / 12.0 : (1.0 - half / std::tan(half)) / (angle * angle);
   return Eigen::Matrix3d::Identity() - 0.5 * cross + c * cross * cross;
+}
+
+// Whether the closed form asks for what was optimised. Where it does not, β still lets an error decay, which the closed
+// form would make up for in one cycle: as much acceleration as the limits allow, and back to the optimisation to brake.
+bool agrees(const AnalyticIk& analytic, const Pose& target, const LimitTracker& tracker,
+            const JointVector& qdot) noexcept {
+  const AnalyticNearest nearest = analytic.nearest(target, tracker.q());
+  if (nearest.status != AnalyticStatus::Ok) return false;
+  const JointVector apart = (nearest.branch.q - tracker.q()) / tracker.options().dt - qdot;
+  const VelocityBounds& bounds = tracker.bounds();
+  return (apart.array().abs() <= kAgree * (bounds.upper - bounds.lower).array()).all();
 }
 
 }  // namespace
@@ -109,6 +121,9 @@ ConstrainedIkStep ConstrainedIk::step(const Pose& target) noexcept {
   } else if (!try_analytic(target, step)) {
     optimise(target, pose_error(reference_, target), step);
   }
+  const bool held = step.active != 0 || step.torque_active || step.error_active || !step.exact_met;
+  last_free_ = step.used == IkSource::Analytic ||
+               (good && analytic_ && !dynamics_ && !held && agrees(*analytic_, target, tracker_, step.qdot));
   tracker_.advance(step.qdot);
   step.q = tracker_.q();
   sigmaik::update(chain_, step.q, state_);
@@ -127,15 +142,13 @@ ConstrainedIkStep ConstrainedIk::step(const Pose& target) noexcept {
   step.error = -pose_error(state_.tip, target);
   step.path_error = -pose_error(state_.tip, reference_);
   const TaskVector missed = select_rows(options_.task, state_.tip.linear(), step.error);
-  const bool held = step.active != 0 || step.torque_active || step.error_active || !step.exact_met;
   step.status = held                                 ? Status::Limited
                 : missed.cwiseAbs().maxCoeff() <= kMet ? Status::Ok
                                                        : Status::Damped;
-  last_free_ = step.used == IkSource::Analytic || !held;
   return step;
 }
 
-// (35): the closed form, where it is inside the limits; and back to it only from inside them.
+// (35): the closed form, where it is inside the limits; and back to it only from inside them, where it agrees.
 bool ConstrainedIk::try_analytic(const Pose& target, ConstrainedIkStep& step) noexcept {
   if (!analytic_ || !last_free_ || dynamics_) return false;
   const JointVector& from = tracker_.q();
@@ -193,6 +206,7 @@ void ConstrainedIk::optimise(const Pose& target, const Twist& motion, Constraine
   JointVector q = from;
   ChainState& state = state_;
   LeastSquaresSolution solution;
+  bool error_lost = false;
   for (int iteration = 0; iteration < options_.iterations; ++iteration) {
     if (iteration > 0) sigmaik::update(chain_, q, state);
     // (11), (12): e ≈ slope Δq + offset, of the tip minus the target; and e* = e + turned ϑ.
@@ -238,6 +252,11 @@ void ConstrainedIk::optimise(const Pose& target, const Twist& motion, Constraine
       if (scaled) p.C.col(n) = select_rows(exact_, rotation, turned);
     }
     solution = least_squares_.solve(p);
+    error_lost = error_rows_ > 0 && solution.equality_error > kMet;
+    if (error_lost) {  // the exact part comes first
+      p.h.tail(error_rows_).setConstant(kInfinity);
+      solution = least_squares_.solve(p);
+    }
     q = from + solution.x.head(n);
   }
   if (solution.status == LeastSquaresStatus::BadInput) {
@@ -252,6 +271,7 @@ void ConstrainedIk::optimise(const Pose& target, const Twist& motion, Constraine
   for (int k = 0; k < p.G.rows(); ++k) {
     if (solution.active >> k & 1u) (k < torque_rows_ ? step.torque_active : step.error_active) = true;
   }
+  step.error_active = step.error_active || error_lost;
   step.exact_met = solution.equality_error <= kMet;
 }
 

@@ -21,7 +21,7 @@ using Vector = typename VectorOf<lanes>::type;
 
 template <int lanes>
 SIGMAIK_INLINE Vector<lanes> splat(double x) {
-  Vector<lanes> v;
+  Vector<lanes> v{};
 #pragma GCC unroll 4
   for (int i = 0; i < lanes; ++i) v[i] = x;
   return v;

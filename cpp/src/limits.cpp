@@ -1,6 +1,7 @@
 #include <sigmaik/limits.hpp>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -254,6 +255,15 @@ LimitTracker::LimitTracker(const JointLimits& limits, const LimitOptions& option
     joint.braking = joint.acceleration * (1.0 - kBrakingReserve);
     joint.jerk = options.jerk ? limits.jerk[i] * dt * dt : kInfinity;
     joint.recovery = options.recovery_speed * limits.velocity[i];
+    lower_[i] = joint.lower;
+    upper_[i] = joint.upper;
+    velocity_[i] = joint.velocity;
+    acceleration_[i] = joint.jerk < kInfinity ? kInfinity : joint.acceleration;
+    has_jerk_ = has_jerk_ || joint.jerk < kInfinity;
+  }
+  for (int i = n_; i < kMaxJoints; ++i) {
+    lower_[i] = -1.0;
+    upper_[i] = velocity_[i] = acceleration_[i] = 1.0;
   }
 }
 
@@ -262,11 +272,12 @@ void LimitTracker::reset(const JointRef& q, const JointRef& qdot) {
   require(q.allFinite(), "q has an entry that is not finite");
   require(qdot.size() == 0 || qdot.size() == n_, "qdot has ", qdot.size(), " entries, the limits ", n_, " joints");
   require(qdot.allFinite(), "qdot has an entry that is not finite");
+  for (JointVector* x : {&q_, &v_, &stop_, &bounds_.lower, &bounds_.upper}) {
+    x->setZero(kMaxJoints);  // beyond n_, too: blocks of a fixed size are read and written
+    x->resize(n_);
+  }
   q_ = q;
-  v_ = qdot.size() != 0 ? JointVector(qdot) : JointVector(JointVector::Zero(n_));
-  stop_.resize(n_);
-  bounds_.lower.resize(n_);
-  bounds_.upper.resize(n_);
+  if (qdot.size() != 0) v_ = qdot;
   for (Joint& joint : joints_) joint.change = joint.slope = 0.0;
   update();
 }
@@ -275,25 +286,73 @@ void LimitTracker::advance(JointVector& qdot) noexcept {
   if (q_.size() == 0) return;
   if (qdot.size() != n_) qdot = stop_;
   for (int i = 0; i < n_; ++i) {
-    Joint& joint = joints_[static_cast<std::size_t>(i)];
-    const double v = std::isnan(qdot[i]) ? stop_[i] : std::clamp(qdot[i], bounds_.lower[i], bounds_.upper[i]);
-    if (joint.jerk < kInfinity) {
-      joint.change = v - v_[i];
-      joint.slope = slope_of(v, v_[i], joint.next, joint.next_slope, joint.jerk);
-    }
-    double q = q_[i] + v * options_.dt;
-    const double rounding = kSnap * (1.0 + std::abs(q_[i]));
-    if (q > joint.upper && q <= joint.upper + rounding) q = joint.upper;
-    if (q < joint.lower && q >= joint.lower - rounding) q = joint.lower;
-    q_[i] = q;
-    v_[i] = qdot[i] = v;
+    if (std::isnan(qdot[i])) qdot[i] = stop_[i];
   }
+  n_ <= 8 ? move<8>(qdot) : move<kMaxJoints>(qdot);
+  qdot = v_;
   update();
+}
+
+template <int kPadded>
+void LimitTracker::move(const JointVector& qdot) noexcept {
+  using Block = Eigen::Array<double, kPadded, 1>;
+  Block v = Block::Zero();
+  v.head(n_) = qdot.array();
+  Eigen::Map<Block> q(q_.data()), last(v_.data());
+  v = v.max(Eigen::Map<const Block>(bounds_.lower.data())).min(Eigen::Map<const Block>(bounds_.upper.data()));
+  if (has_jerk_) {
+    for (int i = 0; i < n_; ++i) {
+      Joint& joint = joints_[static_cast<std::size_t>(i)];
+      if (!(joint.jerk < kInfinity)) continue;
+      joint.change = v[i] - last[i];
+      joint.slope = slope_of(v[i], last[i], joint.next, joint.next_slope, joint.jerk);
+    }
+  }
+  const Block from = q;
+  q += options_.dt * v;
+  last = v;
+  if ((q > upper_.template head<kPadded>()).any() || (q < lower_.template head<kPadded>()).any()) {
+    for (int i = 0; i < n_; ++i) {
+      const Joint& joint = joints_[static_cast<std::size_t>(i)];
+      const double rounding = kSnap * (1.0 + std::abs(from[i]));
+      if (q[i] > joint.upper && q[i] <= joint.upper + rounding) q[i] = joint.upper;
+      if (q[i] < joint.lower && q[i] >= joint.lower - rounding) q[i] = joint.lower;
+    }
+  }
+}
+
+// Bounds of velocity and acceleration for all joints at once. Bit i of the answer: there is more to joint i.
+template <int kPadded>
+unsigned LimitTracker::survey() noexcept {
+  using Block = Eigen::Array<double, kPadded, 1>;
+  const Eigen::Map<const Block> q(q_.data()), v(v_.data());
+  const auto a = acceleration_.template head<kPadded>();
+  const auto limit = velocity_.template head<kPadded>();
+  const Block most = v + a;
+  const Block upper = most.min(limit), lower = (v - a).max(-limit);
+  const Block up = upper.max(0.0), down = (-lower).max(0.0);
+  // A position limit matters where D(v) ≤ v²/2A + v/2 + A/8 does not fit before it; NaN where A is infinite.
+  const Block room = 2.0 * per_dt_ * a * (upper_.template head<kPadded>() - q).min(q - lower_.template head<kPadded>());
+  const Block spare = room - up.max(down) * (up.max(down) + a) - 0.25 * a * a;
+  const Block slow = limit - v.abs();
+  Eigen::Map<Block>(bounds_.lower.data()) = lower;
+  Eigen::Map<Block>(bounds_.upper.data()) = upper;
+  Eigen::Map<Block>(stop_.data()) = lower.max(0.0).min(upper);
+  unsigned more = 0;
+  for (int i = 0; i < n_; ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    if (!(spare[i] >= 0.0 && slow[i] >= 0.0)) more |= 1u << i;
+    bounds_.upper_kind[at] = most[i] > limit[i] ? LimitKind::Velocity : LimitKind::Acceleration;
+    bounds_.lower_kind[at] = v[i] - a[i] < -limit[i] ? LimitKind::Velocity : LimitKind::Acceleration;
+  }
+  return more;
 }
 
 void LimitTracker::update() noexcept {
   outside_ = recovering_ = 0;
-  for (int i = 0; i < n_; ++i) {
+  unsigned more = n_ <= 8 ? survey<8>() : survey<kMaxJoints>();
+  for (; more != 0; more &= more - 1) {
+    const int i = std::countr_zero(more);
     const Joint& joint = joints_[static_cast<std::size_t>(i)];
     if (q_[i] < joint.lower || q_[i] > joint.upper) outside_ |= static_cast<std::uint16_t>(1u << i);
     joint.jerk < kInfinity ? bound_with_jerk(i) : bound(i);
@@ -301,9 +360,34 @@ void LimitTracker::update() noexcept {
   recovering_ |= outside_;
 }
 
+// The velocity from which a joint without a jerk limit can just stop before a position limit that is `room` away; the one
+// that takes it back to the limit, where that is behind it.
+double LimitTracker::towards(const Joint& joint, double room) const noexcept {
+  if (room >= 0.0) return fastest_before(room, joint.braking);
+  const double recovery = joint.recovery < kInfinity ? joint.recovery : std::max(-room * options_.dt, 1e-3) / 0.1;
+  return -std::min(fastest_before(-room, joint.braking), recovery);
+}
+
+VelocityBounds LimitTracker::heading() const noexcept {
+  VelocityBounds out;
+  out.lower.resize(n_);
+  out.upper.resize(n_);
+  for (int i = 0; i < n_; ++i) {
+    const Joint& joint = joints_[static_cast<std::size_t>(i)];
+    const double above = (joint.upper - q_[i]) * per_dt_, below = (q_[i] - joint.lower) * per_dt_;
+    const double highest = above < kInfinity ? towards(joint, above) : kInfinity;
+    const double lowest = below < kInfinity ? -towards(joint, below) : -kInfinity;
+    out.upper[i] = std::clamp(highest, -joint.velocity, joint.velocity);
+    out.lower[i] = std::clamp(lowest, -joint.velocity, joint.velocity);
+    out.upper_kind[static_cast<std::size_t>(i)] = highest < joint.velocity ? LimitKind::Position : LimitKind::Velocity;
+    out.lower_kind[static_cast<std::size_t>(i)] = lowest > -joint.velocity ? LimitKind::Position : LimitKind::Velocity;
+  }
+  return out;
+}
+
 void LimitTracker::bound(int i) noexcept {
   const Joint& joint = joints_[static_cast<std::size_t>(i)];
-  const double v = v_[i], a = joint.acceleration, limit = joint.velocity, dt = options_.dt;
+  const double v = v_[i], a = joint.acceleration, limit = joint.velocity;
   const double least = v - a, most = v + a;
   bool broken = std::abs(v) > limit;
   double upper = most, lower = least;
@@ -318,12 +402,6 @@ void LimitTracker::bound(int i) noexcept {
     lower_kind = LimitKind::Velocity;
   }
 
-  const double braking = joint.braking;
-  const auto fastest_towards = [&](double room) {
-    if (room >= 0.0) return fastest_before(room, braking);
-    const double recovery = joint.recovery < kInfinity ? joint.recovery : std::max(-room * dt, 1e-3) / 0.1;
-    return -std::min(fastest_before(-room, braking), recovery);
-  };
   // D(v) ≤ v²/2A + v/2 + A/8: mostly the limits are farther away than that.
   const double above = (joint.upper - q_[i]) * per_dt_, below = (q_[i] - joint.lower) * per_dt_;
   const auto matters = [&](double fast, double room) {
@@ -331,8 +409,8 @@ void LimitTracker::bound(int i) noexcept {
     return a < kInfinity ? fast * (fast + a) + 0.25 * a * a > 2.0 * a * room : fast > room;
   };
   double highest = kInfinity, lowest = -kInfinity;
-  if (above < kInfinity && matters(upper, above)) highest = fastest_towards(above);
-  if (below < kInfinity && matters(-lower, below)) lowest = -fastest_towards(below);
+  if (above < kInfinity && matters(upper, above)) highest = towards(joint, above);
+  if (below < kInfinity && matters(-lower, below)) lowest = -towards(joint, below);
   const double slack = kTolerance * (a + (1.0 + std::abs(q_[i])) * per_dt_);
   broken = broken || highest < least - slack || lowest > most + slack;
   const double first_upper = upper, first_lower = lower;

@@ -49,23 +49,71 @@ double threshold(const Method& method) noexcept {
       method);
 }
 
-// What redistribution weighs joint motion with, against twist: of σ_max. Small, so that what joints can do is done to
-// eight digits; not zero, so that the answer stays unique where some are held.
-constexpr double kJointWeight = 1e-4;
+// What redistribution weighs joint motion with, against twist: of σ_max. It bounds how fast joints move to make up for
+// little, where those that are left come to a singularity of their own: with a hundredth of it the arm swings there.
+constexpr double kJointWeight = 1e-2;
+// So weighed, a twist of a direction with σ_i misses (λ/σ_i)² of itself. Again from the answer, the square of that.
+constexpr int kPasses = 2;
 // What rows that come first weigh, against the others.
 constexpr double kExactWeight = 1e3;
-
 // A twist that misses this part of itself is done.
-constexpr double kDone = 1e-6;
+constexpr double kDone = 1e-4;
 
-// How much direction i counts in redistribution: σ_i where it is regular, nothing where it is singular, and in between
-// by equal factors for equal steps of σ, as the answer follows the ratio of weights.
-double weight(double sigma, double largest, double threshold) noexcept {
-  const double floor = kJointWeight * largest;
-  const double t = std::clamp(2.0 * sigma / (threshold * largest) - 1.0, 0.0, 1.0);
-  if (!(t > 0.0) || sigma <= floor) return 0.0;
-  const double whole = floor * std::pow(sigma / floor, t);
-  return std::sqrt(std::max(0.0, whole * whole - floor * floor));
+// How much direction i counts in redistribution. With S = Σ s_i u_i v_iᵀ, J-PARSE's q̇ (K = I, no posture) minimises
+// ½|S q̇|² − ẋᵀJ q̇ for just these s_i, so what limits leave of it has ẋᵀJ q̇ ≥ ½|S q̇|² wherever they allow rest: it never
+// moves the tool away from the target. (Guptasarma et al., eq. 37, with limits.)
+double weight(double sigma, double largest, double threshold) noexcept { return std::max(sigma, threshold * largest); }
+
+bool inside(const JointVector& qdot, const VelocityBounds& bounds) noexcept {
+  for (Eigen::Index i = 0; i < qdot.size(); ++i) {
+    if (!(qdot[i] >= bounds.lower[i] && qdot[i] <= bounds.upper[i])) return false;
+  }
+  return true;
+}
+
+// from + s (to − from) for the largest s in [0, 1] for which it is inside the bounds; where none is, for the largest for
+// which it is nearest to them. Sets the bits of the joints that decide it.
+JointVector furthest(const JointVector& from, const JointVector& to, const VelocityBounds& bounds,
+                     std::uint16_t& limiting) noexcept {
+  const auto n = from.size();
+  const JointVector way = to - from;
+  const auto moves = [&](Eigen::Index i) { return std::abs(way[i]) > 1e-12 * std::abs(from[i]); };  // more than rounding
+  double least = 0.0, s = 1.0;
+  for (Eigen::Index i = 0; i < n; ++i) {
+    if (!moves(i)) continue;
+    const bool up = way[i] > 0.0;
+    s = std::min(s, ((up ? bounds.upper : bounds.lower)[i] - from[i]) / way[i]);
+    least = std::max(least, ((up ? bounds.lower : bounds.upper)[i] - from[i]) / way[i]);
+  }
+  const bool meets = s >= least;
+  if (!meets) {
+    // Half the derivative of the squared distance never falls.
+    const double size = way.cwiseAbs().maxCoeff();
+    const auto slope = [&](double at) {
+      double sum = 0.0;
+      for (Eigen::Index i = 0; i < n; ++i) {
+        const double v = from[i] + at * way[i];
+        sum += way[i] / size * (v - std::clamp(v, bounds.lower[i], bounds.upper[i]));
+      }
+      return sum;
+    };
+    s = 1.0;
+    if (slope(1.0) > 0.0) {
+      s = 0.0;
+      for (double part = 0.5; part > 1e-17; part *= 0.5) {
+        if (!(slope(s + part) > 0.0)) s += part;
+      }
+    }
+  }
+  JointVector at = from + s * way;
+  bool rounded = meets;
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const double more = at[i] + 1e-9 * way[i];
+    const bool beyond = at[i] > bounds.upper[i] || at[i] < bounds.lower[i];
+    if (beyond || more > bounds.upper[i] || more < bounds.lower[i]) limiting |= static_cast<std::uint16_t>(1u << i);
+    rounded = rounded && (!beyond || moves(i));
+  }
+  return rounded ? at.cwiseMax(bounds.lower).cwiseMin(bounds.upper) : at;  // not by rounding beyond what it meets
 }
 
 LimitOptions limit_options(const ServoOptions& options) {
@@ -131,7 +179,7 @@ ServoStep Servo::stop(Status status) noexcept {
   step.status = status;
   step.qdot = tracker_.stop();
   step.scale = 0.0;
-  take(step);
+  take(step, false);
   return step;
 }
 
@@ -164,46 +212,92 @@ ServoStep Servo::resolve(const Twist& twist, bool fade) noexcept {
   step.singular = solution.singular;
   step.task_rows = static_cast<int>(solution.directions.cols());
   step.qdot = solution.qdot;
+  step.achieved_twist = solution.achieved_twist;
 
+  bool rule = true;  // the rule's answer stands
   if (fade_ < 1.0) {
     fade_ = options_.soft_start > 0.0 ? std::min(1.0, fade_ + options_.dt / options_.soft_start) : 1.0;
-    if (fade && fade_ < 1.0) step.qdot = fade_ * step.qdot + (1.0 - fade_) * qdot_start_;
-  }
-
-  const VelocityBounds& bounds = tracker_.bounds();
-  if ((step.qdot.array() > bounds.upper.array()).any() || (step.qdot.array() < bounds.lower.array()).any()) {
-    if (options_.on_limit == OnLimit::Scale) {
-      scale(step);
-    } else {
-      redistribute(step);
+    if (fade && fade_ < 1.0) {
+      step.qdot = fade_ * step.qdot + (1.0 - fade_) * qdot_start_;
+      rule = false;
     }
   }
-  if (!(tracker_.q() + options_.dt * step.qdot).allFinite()) return stop(Status::BadInput);  // too far for numbers
-  take(step);
+
+  if (!inside(step.qdot, tracker_.bounds())) {
+    limit(step);
+    rule = false;
+  }
+  // Twists beyond all measure, where no velocity limit is held.
+  if (!(tracker_.q() + options_.dt * step.qdot).allFinite() || !step.achieved_twist.allFinite()) {
+    return stop(Status::BadInput);
+  }
+  take(step, rule);
   return step;
 }
 
-// Sends the command: from here on it is history.
-void Servo::take(ServoStep& step) noexcept {
+// Sends the command: from here on it is history. `achieved`: its twist is known.
+void Servo::take(ServoStep& step, bool achieved) noexcept {
   if (tracker_.q().size() == 0) {
     step.q = step.qdot = JointVector::Zero(chain_.dof());
     return;
   }
+  const JointVector asked = step.qdot;
   tracker_.advance(step.qdot);
   step.q = tracker_.q();
-  Twist achieved = Twist::Zero();
-  for (int i = 0; i < chain_.dof(); ++i) achieved += step.qdot[i] * state_.jacobian.col(i);
-  step.achieved_twist = achieved;
+  if (!achieved || step.qdot != asked) {
+    step.achieved_twist.setZero();
+    for (int i = 0; i < chain_.dof(); ++i) step.achieved_twist += step.qdot[i] * state_.jacobian.col(i);
+  }
   sigmaik::update(chain_, step.q, state_);
 }
 
-void Servo::redistribute(ServoStep& step) noexcept {
-  // x = q̇ − q̇_rule, and slack s that stands for the twist: min |x|² + |s|², M x + λ s = 0, which is
-  // min |M x|² + λ² |x|² in one level, without squaring M.
+void Servo::limit(ServoStep& step) noexcept {
+  const VelocityBounds& bounds = tracker_.bounds();
+  const JointVector asked = step.qdot;
+
+  // Where to head.
+  const VelocityBounds heading = tracker_.heading();
+  if (!inside(asked, heading)) {
+    if (options_.on_limit == OnLimit::Redistribute) {
+      step.qdot = redistribute(asked, heading, step);
+    } else {
+      const JointVector rest = JointVector::Zero(chain_.dof());
+      step.qdot = furthest(rest, asked, heading, step.limiting_joints);
+    }
+  }
+  // How far to get there in this cycle.
+  if (!inside(step.qdot, bounds)) {
+    step.qdot = furthest(tracker_.qdot(), step.qdot, bounds, step.limiting_joints);
+    if (options_.on_limit == OnLimit::Redistribute && !inside(step.qdot, bounds)) {
+      step.qdot = redistribute(step.qdot, bounds, step);
+    }
+    step.qdot = step.qdot.cwiseMax(bounds.lower).cwiseMin(bounds.upper);
+  }
+
+  // How much of the rule's twist is left, along itself and in the weights of the rule, and how much is missed at all.
+  const Spectrum& spectrum = solver_.spectrum();
+  const double size = std::max(asked.cwiseAbs().maxCoeff(), std::numeric_limits<double>::min());  // squares overflow
+  double along = 0.0, whole = 0.0, missed = 0.0;
+  for (int i = 0; i < spectrum.size(); ++i) {
+    const double part = spectrum.sigma(i) * (spectrum.v(i).dot(asked) / size);
+    const double done = spectrum.sigma(i) * (spectrum.v(i).dot(step.qdot) / size);
+    along += part * done;
+    whole += part * part;
+    missed += (part - done) * (part - done);
+  }
+  if (missed > kDone * kDone * whole) {
+    step.scale = along >= whole ? 1.0 : along > 0.0 ? along / whole : 0.0;  // NaN, where nothing was asked: 0
+    step.status = Status::Limited;
+  }
+}
+
+JointVector Servo::redistribute(const JointVector& qdot, const VelocityBounds& bounds, ServoStep& step) noexcept {
+  // For q̇ + x, from x = 0 on, and slack s that stands for the twist still missed: min |x|² + |s|², M x + λ s = missed, which
+  // is min |M x − missed|² + λ² |x|² in one level, without squaring M.
   const int n = chain_.dof();
   const Spectrum& spectrum = solver_.spectrum();
   const int m = spectrum.size();
-  const double largest = spectrum.sigma(0), limit = threshold(solver_.method());
+  const double largest = spectrum.sigma(0), regular = threshold(solver_.method());
   const bool ranked = options_.exact != std::array<bool, 6>{};
   const int rows = ranked ? spectrum.rows() : m;
 
@@ -211,10 +305,10 @@ void Servo::redistribute(ServoStep& step) noexcept {
   C.setZero(rows, n + rows);
   problem_.d.setZero(rows);
   if (!ranked) {
-    for (int i = 0; i < m; ++i) C.row(i).head(n) = weight(spectrum.sigma(i), largest, limit) * spectrum.v(i).transpose();
+    for (int i = 0; i < m; ++i) C.row(i).head(n) = weight(spectrum.sigma(i), largest, regular) * spectrum.v(i).transpose();
   } else {
     for (int i = 0; i < m; ++i) {
-      const double w = weight(spectrum.sigma(i), largest, limit);
+      const double w = weight(spectrum.sigma(i), largest, regular);
       for (int k = 0; k < rows; ++k) C.row(k).head(n) += w * spectrum.u(i)[k] * spectrum.v(i).transpose();
     }
     // The rows that come first have singularities of their own.
@@ -228,7 +322,7 @@ void Servo::redistribute(ServoStep& step) noexcept {
     exact_spectrum_.decompose(first);
     first.setZero();
     for (int i = 0; i < exact_spectrum_.size(); ++i) {
-      const double w = weight(exact_spectrum_.sigma(i), exact_spectrum_.sigma(0), limit);
+      const double w = weight(exact_spectrum_.sigma(i), exact_spectrum_.sigma(0), regular);
       first += w * exact_spectrum_.u(i) * exact_spectrum_.v(i).transpose();
     }
     int row = 0;
@@ -240,82 +334,28 @@ void Servo::redistribute(ServoStep& step) noexcept {
   }
   for (int k = 0; k < rows; ++k) C(k, n + k) = kJointWeight * largest;
 
-  const VelocityBounds& bounds = tracker_.bounds();
   problem_.lower.setConstant(n + rows, -std::numeric_limits<double>::infinity());
   problem_.upper.setConstant(n + rows, std::numeric_limits<double>::infinity());
-  problem_.lower.head(n) = bounds.lower - step.qdot;
-  problem_.upper.head(n) = bounds.upper - step.qdot;
-  const LeastSquaresSolution solution = least_squares_.solve(problem_);
-  if (solution.status == LeastSquaresStatus::BadInput) {
-    scale(step);  // numbers too far apart
-    return;
-  }
-  const JointVector asked = step.qdot;
-  step.qdot += solution.x.head(n);
-  const std::uint32_t held = solution.at_lower | solution.at_upper;
-  for (int i = 0; i < n; ++i) {
-    const bool free = bounds.lower[i] < bounds.upper[i] || asked[i] != bounds.lower[i];
-    if ((held >> i & 1u) != 0 && free) step.limiting_joints |= static_cast<std::uint16_t>(1u << i);
-  }
-
-  // How much of the rule's twist is left, along itself and in the weights of the rule, and how much is missed at all.
-  double along = 0.0, whole = 0.0, missed = 0.0;
-  for (int i = 0; i < m; ++i) {
-    const double part = spectrum.sigma(i) * spectrum.v(i).dot(asked);
-    const double done = spectrum.sigma(i) * spectrum.v(i).dot(step.qdot);
-    along += part * done;
-    whole += part * part;
-    missed += (part - done) * (part - done);
-  }
-  step.scale = whole > 0.0 ? std::clamp(along / whole, 0.0, 1.0) : 1.0;
-  if (missed > kDone * kDone * whole) {
-    step.status = Status::Limited;
-  } else {
-    step.scale = 1.0;  // other joints do it all
-  }
-}
-
-void Servo::scale(ServoStep& step) const noexcept {
-  const VelocityBounds& bounds = tracker_.bounds();
-  const JointVector asked = step.qdot;
-  const int n = chain_.dof();
-
-  // The largest s in [0, 1] whose s q̇ is inside the bounds.
-  double least = 0.0, s = 1.0;
-  for (int i = 0; i < n; ++i) {
-    if (asked[i] == 0.0) continue;
-    const bool up = asked[i] > 0.0;
-    s = std::min(s, (up ? bounds.upper : bounds.lower)[i] / asked[i]);
-    least = std::max(least, (up ? bounds.lower : bounds.upper)[i] / asked[i]);
-  }
-  if (s < least) {
-    // None is: the largest that is nearest to them. Half the derivative of the squared distance never falls.
-    const double size = asked.cwiseAbs().maxCoeff();
-    const auto slope = [&](double at) {
-      double sum = 0.0;
-      for (int i = 0; i < n; ++i) {
-        const double v = at * asked[i];
-        sum += asked[i] / size * (v - std::clamp(v, bounds.lower[i], bounds.upper[i]));
-      }
-      return sum;
-    };
-    s = 1.0;
-    if (slope(1.0) > 0.0) {
-      s = 0.0;
-      for (double part = 0.5; part > 1e-17; part *= 0.5) {
-        if (!(slope(s + part) > 0.0)) s += part;
-      }
+  std::uint32_t held = 0;
+  JointVector x = qdot;
+  for (int pass = 0; pass < kPasses; ++pass) {
+    problem_.lower.head(n) = bounds.lower - x;
+    problem_.upper.head(n) = bounds.upper - x;
+    for (int k = 0; k < rows; ++k) problem_.d[k] = C.row(k).head(n).dot(qdot - x);
+    const LeastSquaresSolution solution = least_squares_.solve(problem_);
+    if (solution.status == LeastSquaresStatus::BadInput) {  // numbers too far apart
+      return qdot.cwiseMax(bounds.lower).cwiseMin(bounds.upper);
     }
+    // One ulp beyond a bound that the last command is on, and there would be no way from there.
+    x = (x + solution.x.head(n)).cwiseMax(bounds.lower).cwiseMin(bounds.upper);
+    held |= solution.at_lower | solution.at_upper;
   }
   for (int i = 0; i < n; ++i) {
-    const double v = s * asked[i], more = s * (1.0 + 1e-9) * asked[i];
-    step.qdot[i] = std::clamp(v, bounds.lower[i], bounds.upper[i]);
-    if (v != step.qdot[i] || more > bounds.upper[i] || more < bounds.lower[i]) {
-      step.limiting_joints |= static_cast<std::uint16_t>(1u << i);
-    }
+    const bool on = x[i] == bounds.lower[i] || x[i] == bounds.upper[i];
+    const bool free = bounds.lower[i] < bounds.upper[i] || qdot[i] != bounds.lower[i];
+    if ((held >> i & 1u) != 0 && on && free) step.limiting_joints |= static_cast<std::uint16_t>(1u << i);
   }
-  step.scale = s;
-  step.status = Status::Limited;
+  return x;
 }
 
 }  // namespace sigmaik

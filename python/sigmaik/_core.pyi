@@ -6,7 +6,7 @@ import enum
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['AdaptiveDampedLeastSquares', 'Chain', 'DampedLeastSquares', 'Dynamics', 'Error', 'JParse', 'JacobianProjection', 'JacobianSafety', 'JacobianSafetyProjection', 'JointLimits', 'PseudoInverse', 'SelectivelyDampedLeastSquares', 'Servo', 'ServoStep', 'Solution', 'Spectrum', 'Status', 'VelocitySolver', 'pose_error', 'rotation_exp', 'rotation_log', 'solve_batch']
+__all__: list[str] = ['AdaptiveDampedLeastSquares', 'AnalyticBranch', 'AnalyticIk', 'Chain', 'ConstrainedIk', 'ConstrainedIkStep', 'DampedLeastSquares', 'Dynamics', 'Error', 'JParse', 'JacobianProjection', 'JacobianSafety', 'JacobianSafetyProjection', 'JointLimits', 'LeastSquaresSolution', 'PseudoInverse', 'SelectivelyDampedLeastSquares', 'Servo', 'ServoStep', 'Solution', 'Spectrum', 'Status', 'VelocitySolver', 'least_squares', 'pose_error', 'rotation_exp', 'rotation_log', 'solve_batch']
 class Error(ValueError):
     """
     What set-up and checked calls refuse. The text carries the facts.
@@ -33,6 +33,11 @@ class JointLimits:
     def effort(self) -> numpy.typing.NDArray[numpy.float64]:
         """
         (n,) [N·m or N]
+        """
+    @property
+    def jerk(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (n,) [rad/s³ or m/s³]
         """
     @property
     def lower(self) -> numpy.typing.NDArray[numpy.float64]:
@@ -88,7 +93,7 @@ class Chain:
 
         seed: what numpy.random.default_rng takes, a Generator included.
         """
-    def with_limits(self, *, lower: numpy.typing.ArrayLike | None = None, upper: numpy.typing.ArrayLike | None = None, velocity: numpy.typing.ArrayLike | None = None, acceleration: numpy.typing.ArrayLike | None = None, effort: numpy.typing.ArrayLike | None = None) -> Chain:
+    def with_limits(self, *, lower: numpy.typing.ArrayLike | None = None, upper: numpy.typing.ArrayLike | None = None, velocity: numpy.typing.ArrayLike | None = None, acceleration: numpy.typing.ArrayLike | None = None, jerk: numpy.typing.ArrayLike | None = None, effort: numpy.typing.ArrayLike | None = None) -> Chain:
         """
         The same arm with other limits: (n,) or one number each, infinite for none; None keeps what there is.
         """
@@ -121,6 +126,73 @@ class Chain:
     def tip(self) -> str:
         """
         Name of the tip link.
+        """
+class AnalyticBranch:
+    """
+    One posture of a pose, from AnalyticIk.branches().
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def q(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (6,) [rad]
+        """
+    @property
+    def singular(self) -> tuple[str, ...]:
+        """
+        Those of 'shoulder', 'elbow', 'wrist' where this branch and another have become one.
+        """
+    @property
+    def within_limits(self) -> bool:
+        """
+        Every joint is within the chain's limits.
+        """
+class AnalyticIk:
+    """
+    Closed-form inverse kinematics of six revolute joints with a spherical wrist.
+
+    Covers arms whose axes 4, 5, 6 meet in one point and whose axes 2 and 3 are parallel, to
+    1e-9 [rad, or of the arm's size], however frames, signs and zeros are laid: offsets, and
+    angles other than right ones, included. Immutable, safe to share.
+    """
+    def __init__(self, chain: Chain) -> None:
+        """
+        Raises Error with the facts where the arm is not of this kind.
+        """
+    def __repr__(self) -> str:
+        ...
+    def branches(self, pose: typing.Any, *, within_limits: bool = False) -> list[AnalyticBranch]:
+        """
+        The postures of solve() in the same order, each with its limits and singularities.
+        """
+    def nearest(self, pose: typing.Any, q: numpy.typing.ArrayLike, *, within_limits: bool = False) -> numpy.typing.NDArray[numpy.float64] | None:
+        """
+        The posture (6,) [rad] of `pose` (4, 4) nearest to q (6,) by Euclidean norm; None where out of reach.
+
+        One within the joint limits where there is one. within_limits: None where there is not.
+
+        Each joint is on the turn nearest to q within its limits. An angle that is free at a singularity stays as
+        in q, so that a path straight through is followed.
+        """
+    def singular(self, pose: typing.Any) -> tuple[str, ...]:
+        """
+        Those of 'shoulder', 'elbow', 'wrist' that any posture of `pose` (4, 4) is singular by; branches() tells
+        which posture.
+        """
+    def solve(self, pose: typing.Any, *, within_limits: bool = False) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Every posture (k, 6) [rad] of `pose` (4, 4), tip in base: k ≤ 8, and 0 where it is out of reach.
+
+        within_limits: leave out postures beyond a joint limit.
+
+        Each joint is on the turn nearest to 0 within its limits, in (−π, π] where there is none. Branches that
+        are one at a singularity are given once; an angle that is free there is as close to 0 as limits allow.
+        """
+    @property
+    def chain(self) -> Chain:
+        """
+        The arm.
         """
 class PseudoInverse:
     """
@@ -430,7 +502,7 @@ class ServoStep:
     @property
     def limiting_joints(self) -> tuple[int, ...]:
         """
-        Indices of the joints whose limits determine `scale`.
+        Indices of the joints held at a limit that the rule's answer would break.
         """
     @property
     def pose_error(self) -> numpy.typing.NDArray[numpy.float64]:
@@ -450,7 +522,7 @@ class ServoStep:
     @property
     def scale(self) -> float:
         """
-        In [0, 1]: what limits left of the rule's answer.
+        In [0, 1], what limits left: of the rule's speed ('scale'), or of its twist along itself ('redistribute').
         """
     @property
     def singular(self) -> numpy.typing.NDArray[numpy.bool]:
@@ -471,9 +543,10 @@ class Servo:
     """
     Drives a chain's reference configuration towards poses, or along twists, one cycle a call.
 
-    It integrates its own command (q ← q + q̇ dt) and reads no measured positions.
+    It integrates its own command (q ← q + q̇ dt) and reads no measured positions. Every command holds
+    the chain's limits and leaves room to go on holding them; a start outside them comes back.
     """
-    def __init__(self, chain: Chain, method: PseudoInverse | DampedLeastSquares | AdaptiveDampedLeastSquares | SelectivelyDampedLeastSquares | JParse | JacobianProjection | JacobianSafety | JacobianSafetyProjection, dt: typing.SupportsFloat | typing.SupportsIndex = 0.001, *, gain_linear: typing.SupportsFloat | typing.SupportsIndex = 5.0, gain_angular: typing.SupportsFloat | typing.SupportsIndex = 5.0, max_linear_error: typing.SupportsFloat | typing.SupportsIndex = 0.25, max_angular_error: typing.SupportsFloat | typing.SupportsIndex = 1.0, soft_start: typing.SupportsFloat | typing.SupportsIndex = 0.1, posture: numpy.typing.ArrayLike | None = None, posture_gain: typing.SupportsFloat | typing.SupportsIndex = 0.0, posture_max_speed: typing.SupportsFloat | typing.SupportsIndex = ..., velocity_limits: bool = True, on_limit: str = 'scale', length_scale: typing.SupportsFloat | typing.SupportsIndex = 1.0, mask: numpy.typing.ArrayLike | None = None, frame: str = 'base') -> None:
+    def __init__(self, chain: Chain, method: PseudoInverse | DampedLeastSquares | AdaptiveDampedLeastSquares | SelectivelyDampedLeastSquares | JParse | JacobianProjection | JacobianSafety | JacobianSafetyProjection, dt: typing.SupportsFloat | typing.SupportsIndex = 0.001, *, gain_linear: typing.SupportsFloat | typing.SupportsIndex = 5.0, gain_angular: typing.SupportsFloat | typing.SupportsIndex = 5.0, max_linear_error: typing.SupportsFloat | typing.SupportsIndex = 0.25, max_angular_error: typing.SupportsFloat | typing.SupportsIndex = 1.0, soft_start: typing.SupportsFloat | typing.SupportsIndex = 0.1, posture: numpy.typing.ArrayLike | None = None, posture_gain: typing.SupportsFloat | typing.SupportsIndex = 0.0, posture_max_speed: typing.SupportsFloat | typing.SupportsIndex = ..., position_limits: bool = True, velocity_limits: bool = True, acceleration_limits: bool = True, jerk_limits: bool = True, recovery_speed: typing.SupportsFloat | typing.SupportsIndex = 0.1, on_limit: str = 'redistribute', exact: numpy.typing.ArrayLike | None = None, length_scale: typing.SupportsFloat | typing.SupportsIndex = 1.0, mask: numpy.typing.ArrayLike | None = None, frame: str = 'base') -> None:
         """
         dt: [s] from one update to the next.
         gain_linear, gain_angular: [1/s] from pose error to twist.
@@ -482,7 +555,12 @@ class Servo:
             was told that the arm moves.
         posture: (n,) nominal positions, by default those given to reset(); posture_gain [1/s];
         posture_max_speed [rad/s or m/s] caps each joint.
-        velocity_limits: hold the chain's; on_limit 'scale': all joints slow down together.
+        position_limits, …: which of the chain's limits are held, now and so that they can be held for ever.
+        recovery_speed: in (0, 1], of the velocity limit, least speed of a joint that starts outside its position
+            limits on its way back.
+        on_limit: what gives way. 'redistribute': other joints take over, for the nearest twist that limits allow;
+            'scale': direction kept, speed given up.
+        exact: (6,) truth values: rows (vx, vy, vz, ωx, ωy, ωz) that come before the others when redistributing.
         length_scale, mask, frame: as for VelocitySolver.
         """
     def reset(self, q: numpy.typing.ArrayLike, qdot: numpy.typing.ArrayLike | None = None) -> None:
@@ -549,6 +627,179 @@ class Dynamics:
         """
         M (n, n) [kg·m²] at q (n,).
         """
+class LeastSquaresSolution:
+    """
+    Answer of least_squares().
+    """
+    @property
+    def active(self) -> tuple[int, ...]:
+        """
+        Indices of the rows of G that hold the answer, or are violated.
+        """
+    @property
+    def at_lower(self) -> tuple[int, ...]:
+        """
+        Indices of the unknowns held at their lower bound.
+        """
+    @property
+    def at_upper(self) -> tuple[int, ...]:
+        """
+        Indices of the unknowns held at their upper bound.
+        """
+    @property
+    def equality_error(self) -> float:
+        """
+        |C x − d|
+        """
+    @property
+    def status(self) -> str:
+        """
+        'optimal'; 'infeasible': G x ≤ h or C x = d cannot be met, and is met as well as possible;
+        'step limit': not converged.
+        """
+    @property
+    def steps(self) -> int:
+        """
+        Factorisations taken.
+        """
+    @property
+    def violation(self) -> float:
+        """
+        |max(0, G x − h)|
+        """
+    @property
+    def x(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (n,) inside the bounds exactly
+        """
+class ConstrainedIkStep:
+    """
+    Answer of one step of a ConstrainedIk.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def active(self) -> tuple[int, ...]:
+        """
+        Indices of the joints of which a limit is active.
+        """
+    @property
+    def error(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (6,) [m, rad] tip minus target after the step, base axes
+        """
+    @property
+    def error_active(self) -> bool:
+        """
+        max_error is active, or has been let go.
+        """
+    @property
+    def exact_met(self) -> bool:
+        """
+        The exact part's equations hold.
+        """
+    @property
+    def path_error(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (6,) [m, rad] the same, of the target slowed down by time_scale
+        """
+    @property
+    def q(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (n,) position command [rad or m]
+        """
+    @property
+    def qdot(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (n,) velocity command over the last dt [rad/s or m/s]
+        """
+    @property
+    def status(self) -> Status:
+        """
+        OK: the target is met. DAMPED: not met, and no limit is to blame. LIMITED: a limit holds the step back.
+        """
+    @property
+    def time_scale(self) -> float:
+        """
+        ϑ in [0, 1]: 0 as asked, 1 a complete stop; how hard the step is within the limits.
+        """
+    @property
+    def torque_active(self) -> bool:
+        """
+        A torque limit is active, or cannot be met.
+        """
+    @property
+    def used(self) -> str:
+        """
+        'analytic' or 'optimised'
+        """
+class ConstrainedIk:
+    """
+    Follows a target pose inside every joint limit: an exact part, and the rest as well as the
+    limits allow (Schreiber, Otter and Hirzinger 1999).
+    """
+    def __init__(self, chain: Chain, dt: typing.SupportsFloat | typing.SupportsIndex = 0.001, *, exact: numpy.typing.ArrayLike = (1, 1, 1, 0, 0, 0), alpha: typing.Any = 1.0, beta: typing.Any = 5.0, gamma: typing.SupportsFloat | typing.SupportsIndex | None = None, max_error: typing.Any = None, iterations: typing.SupportsInt | typing.SupportsIndex = 2, torque_limits: bool = False, analytic: bool = True, mask: numpy.typing.ArrayLike | None = None, frame: str = 'base', gravity: numpy.typing.ArrayLike | None = None, position_limits: bool = True, velocity_limits: bool = True, acceleration_limits: bool = True, jerk_limits: bool = True, recovery_speed: typing.SupportsFloat | typing.SupportsIndex = 0.1) -> None:
+        """
+        dt: [s] from one step to the next.
+        exact: (6,) truth values: rows (vx, vy, vz, ωx, ωy, ωz) met exactly; the others as well as limits allow.
+        alpha, beta: a number or (6,): weights of the error and of its change in a cycle. Free of limits an error
+            decays by the factor β²/(α²+β²) a cycle (5 √(1 ms/dt) makes that 25 ms at any dt); with β = 0 the joints
+            may oscillate.
+        gamma: weight of the time scaling ϑ; None: the target is not slowed down.
+        max_error: a number or (6,) [m, rad], largest error of the approximate rows, each for itself; let go where
+            it cannot be had together with the exact part; None: any.
+        iterations: linearisations a step. torque_limits: hold the chain's efforts, with its inertias and
+        `gravity` (3,) [m/s²]; the closed form is not used then.
+        analytic: use the closed form where the chain has one and its answer is inside the limits.
+        mask, frame: rows that matter at all, in 'base' or 'tool' axes.
+        position_limits, …: which limits are held. recovery_speed: in (0, 1], of the velocity limit, least speed
+            of a joint that starts outside its position limits on its way back.
+        """
+    def reset(self, q: numpy.typing.ArrayLike, qdot: numpy.typing.ArrayLike | None = None) -> None:
+        """
+        Starts, or starts again, at q (n,), moving with qdot (n,).
+        """
+    def step(self, target: typing.Any) -> ConstrainedIkStep:
+        """
+        One cycle towards a pose (4, 4) of the tip in the base. Raises Error where it is none.
+        """
+    @property
+    def chain(self) -> Chain:
+        ...
+    @property
+    def dt(self) -> float:
+        """
+        [s]
+        """
+    @property
+    def has_analytic(self) -> bool:
+        """
+        Whether the closed form is at hand.
+        """
+    @property
+    def pose(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (4, 4) tip in base at q.
+        """
+    @property
+    def q(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (n,) where the reference stands.
+        """
+    @property
+    def reference(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (4, 4) the pose that the last step aimed at: its target, slowed down by ϑ.
+        """
+def least_squares(A: numpy.typing.ArrayLike | None = None, b: numpy.typing.ArrayLike | None = None, *, C: numpy.typing.ArrayLike | None = None, d: numpy.typing.ArrayLike | None = None, lower: numpy.typing.ArrayLike | None = None, upper: numpy.typing.ArrayLike | None = None, G: numpy.typing.ArrayLike | None = None, h: numpy.typing.ArrayLike | None = None) -> LeastSquaresSolution:
+    """
+    min |A x − b|² where C x = d, lower ≤ x ≤ upper, G x ≤ h; of these the shortest x.
+
+    A (m, n), b (m,), C (p, n), d (p,), lower, upper (n,), G (k, n), h (k,); n ≤ 24, m ≤ 32, p ≤ 8, k ≤ 32.
+    Bounds and h may be infinite.
+
+    There is always an answer: the bounds hold, then G x ≤ h as well as possible, then C x = d, then A x ≈ b.
+    """
 def pose_error(current: typing.Any, target: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
     """
     [e_p; e_o] (6,) that takes `current` to `target` (4×4 poses in one frame).

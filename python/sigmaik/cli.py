@@ -1,4 +1,4 @@
-"""The command `sigmaik`: reach (experiments), robots, info.
+"""The command `sigmaik`: reach, limits and axis5 (experiments), robots, info.
 
 Everything that is asked of a file or an option and is wrong there ends with one line on stderr and exit code
 2.
@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 import sigmaik as sk
 
 from . import experiments as ex
+from .experiments import axis5
 from .experiments.reach import load_arm
 
 if TYPE_CHECKING:
@@ -62,6 +63,8 @@ def _parser() -> argparse.ArgumentParser:
     _add_reach(
         commands.add_parser("reach", help="drive an arm along a path by one method or several, and compare")
     )
+    _add_axis5(commands.add_parser("axis5", help="drive a KUKA arm by its axis-5 singularity, within limits"))
+    _add_limits(commands.add_parser("limits", help="what joint limits cost, and what breaks without them"))
     robots = commands.add_parser("robots", help="list the arms that are shipped, and their paths")
     robots.set_defaults(run=_robots)
     _add_info(commands.add_parser("info", help="an arm's joints, limits, reach and singular values"))
@@ -239,6 +242,197 @@ def _headline(experiment: ex.Experiment) -> str:
         f"{experiment.path.duration:g} s at {s.rate:g} Hz, gains {s.gain_linear:g} and {s.gain_angular:g}/s, "
         f"position error capped at {s.max_position_error:g} m, γ = {s.gamma:g}, {posture}"
     )
+
+
+# --- axis5
+
+
+def _add_axis5(parser: argparse.ArgumentParser) -> None:
+    parser.description = (
+        "Two experiments on a KUKA KR 6 R900 (Schreiber, Otter, Hirzinger 1999): closed form against "
+        "constrained least squares with the position exact, without the error's rate (β = 0), with time "
+        "scaling, and with time scaling and all six rows exact. Prints tables, and writes the time series, "
+        "the table and pictures. The last line on stdout is the overview picture's path."
+    )
+    motion = parser.add_argument_group("the motion")
+    motion.add_argument(
+        "--example",
+        type=int,
+        choices=axis5.EXAMPLES,
+        required=True,
+        help="1: there and back, close by the singularity; 2: straight across it",
+    )
+    for option, unit, text in (
+        ("--distance", "M", "from one end of the line to the other (0.2)"),
+        ("--duration", "S", "from one end to the other (2, 0.5)"),
+        ("--offset", "DEG", "of axis 5 from zero, where it is closest (1), or at the start (0)"),
+    ):
+        motion.add_argument(option, type=float, metavar=unit, help=text)
+    solver = parser.add_argument_group("the samples and the solver")
+    for option, unit, text in (
+        ("--dt", "S", "from one sample to the next (0.004)"),
+        ("--beta", "Β", "weight of the error's change in a sample (5 at 1 ms, ∝ 1/√dt)"),
+        ("--gamma", "Γ", "weight of the time scaling (0.005 at 4 ms, ∝ √dt)"),
+        ("--max-error", "DEG", "largest orientation error about each axis; inf for any (3)"),
+    ):
+        solver.add_argument(option, type=float, metavar=unit, help=text)
+    solver.add_argument("--iterations", type=int, help="linearisations a sample (2)")
+    out = parser.add_argument_group("what is written")
+    out.add_argument("--out", default="sigmaik-axis5", type=pathlib.Path, metavar="DIR", help="(%(default)s)")
+    out.add_argument(
+        "--format", choices=("npz", "csv", "none"), default="npz", help="of the time series (%(default)s)"
+    )
+    out.add_argument(
+        "--no-plots", action="store_true", help="no pictures; the last line is the table's path then"
+    )
+    parser.set_defaults(run=_axis5)
+
+
+def _axis5(arguments: argparse.Namespace) -> int:
+    console = _console()
+    if not arguments.no_plots:
+        _need("matplotlib")
+    offset = None if arguments.offset is None else math.radians(arguments.offset)
+    motion = axis5.motion(arguments.example, arguments.distance, arguments.duration, offset)
+    changes = {name: getattr(arguments, name) for name in ("dt", "beta", "gamma", "iterations")}
+    if arguments.max_error is not None:
+        changes["max_error"] = math.radians(arguments.max_error)
+    settings = axis5.Settings(**{name: value for name, value in changes.items() if value is not None})
+    tracks = [axis5.run(motion, variant, settings) for variant in axis5.VARIANTS]
+    rows = [axis5.summarize(track) for track in tracks]
+
+    console.print(axis5.headline(motion, settings), highlight=False)
+    console.print(axis5.summary_table(rows))
+    console.print(axis5.smoothness_table(rows))
+    out: pathlib.Path = arguments.out
+    stem = f"axis5-example{motion.example}"
+    if arguments.format != "none":
+        for track in tracks:
+            axis5.save_track(track, out / f"{stem}-{track.variant}.{arguments.format}", arguments.format)
+        print(f"time series: {len(tracks)} files {out / stem}-*.{arguments.format}")
+    table = axis5.save_summary(rows, out / f"{stem}.csv")
+    if arguments.no_plots:
+        print(table)
+        return 0
+    print(f"table: {table}")
+
+    from . import plots_axis5
+    from .plots import save_figure
+
+    for joint in range(6):
+        save_figure(plots_axis5.axis_figure(tracks, joint), out / f"{stem}-axis{joint + 1}.png")
+    save_figure(plots_axis5.error_figure(tracks), out / f"{stem}-error.png")
+    print(f"pictures: {out / stem}-axis1.png to -axis6.png and {stem}-error.png")
+    print(save_figure(plots_axis5.overview_figure(tracks), out / f"{stem}.png"))
+    return 0
+
+
+# --- limits
+
+
+def _add_limits(parser: argparse.ArgumentParser) -> None:
+    parser.description = (
+        "Drives an arm beyond its reach, beyond its joint limits, and by random twists, with its limits "
+        "held in three ways, clamped joint by joint, and not at all. Prints tables, and writes their figures "
+        "as CSV, pictures, and the time series if asked. The last line on stdout is the CSV file's path."
+    )
+    parser.epilog = "ways: " + "; ".join(f"{name}: {text}" for name, text in ex.VARIANTS.items())
+    parser.add_argument(
+        "--robot", default="ufactory_xarm7", help="a shipped arm or a URDF file (%(default)s)"
+    )
+    parser.add_argument("--base", help="base link (the URDF's root)")
+    parser.add_argument("--tip", help="tip link (the URDF's only leaf)")
+    parser.add_argument("--method", default="jparse", help="the rule, as for reach (%(default)s)")
+    defaults = ex.LimitsSettings()
+    for option, kind, unit, text in (
+        ("--seed", int, "N", "of directions, starts and twists"),
+        ("--rate", float, "HZ", "control rate"),
+        ("--trials", int, "N", "directions that the target out of reach is tried in"),
+        ("--seconds", float, "S", "of random twists"),
+        ("--pace", float, "X", "the other scenarios take X times as long"),
+        ("--acceleration", float, "LIMIT", "of all joints, rad/s² or m/s² (the arm's own)"),
+        ("--jerk", float, "LIMIT", "of all joints, rad/s³ or m/s³ (the arm's own)"),
+    ):
+        name = option.removeprefix("--")
+        value = getattr(defaults, name)
+        shown = text if value is None else f"{text} ({value:g})"
+        parser.add_argument(option, type=kind, default=value, metavar=unit, help=shown)
+    out = parser.add_argument_group("what is written")
+    out.add_argument(
+        "--out", default="sigmaik-limits", type=pathlib.Path, metavar="DIR", help="(%(default)s)"
+    )
+    out.add_argument(
+        "--format",
+        choices=("npz", "none"),
+        default="none",
+        help="of the time series, 10 MB each (%(default)s)",
+    )
+    out.add_argument("--no-plot", action="store_true", help="no pictures")
+    parser.set_defaults(run=_run_limits)
+
+
+def _run_limits(arguments: argparse.Namespace) -> int:
+    console = _console()
+    if not arguments.no_plot:
+        _need("matplotlib")
+    names = ("seed", "rate", "trials", "seconds", "pace", "acceleration", "jerk")
+    settings = ex.LimitsSettings(**{name: getattr(arguments, name) for name in names})
+    experiment = ex.load_limits(
+        arguments.robot, settings, arguments.method, base=arguments.base, tip=arguments.tip
+    )
+
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    from .experiments.table import broken_table, cost_table, hold_table
+
+    out: pathlib.Path = arguments.out
+    rows, pictures = [], []
+    stderr = Console(stderr=True)
+    columns = (TextColumn("{task.description:<32}"), BarColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=stderr, transient=True, disable=not stderr.is_terminal) as progress:
+        task = progress.add_task("", total=experiment.cycles * len(ex.VARIANTS))
+        for scenario, trials in experiment.trials.items():
+            stem = f"{experiment.robot}-limits-{scenario.replace(' ', '-')}"
+            shown = []
+            for variant in ex.VARIANTS:
+                progress.update(task, description=f"{scenario}, {variant}")
+                traces = [
+                    ex.drive(experiment, scenario, trial, variant, lambda n: progress.advance(task, n))
+                    for trial in trials
+                ]
+                rows.append(ex.summarize_limits(traces))
+                if arguments.format != "none":
+                    ex.save_traces(traces, out / f"{stem}-{variant.replace(' ', '-')}.npz")
+                shown.append(traces[ex.shown_trial(scenario, trials)])
+            if not arguments.no_plot:
+                from . import plots
+
+                window = (0.0, min(15.0, settings.seconds)) if scenario == "teleoperation" else None
+                figure = plots.limits_figure(shown, window)
+                pictures.append(plots.save_figure(figure, out / f"{stem}.png"))
+
+    text = f"{experiment.robot}, {experiment.method.label}, {settings.rate:g} Hz, seed {settings.seed}"
+    console.print(text, highlight=False)
+    for scenario in experiment.trials:
+        console.print(f"  {scenario}: {ex.SCENARIOS[scenario]}", highlight=False)
+    for table in (broken_table(rows), cost_table(rows), hold_table(rows)):
+        console.print()
+        console.print(table)
+    console.print(
+        "\nbroken: joints times cycles; by rad or m, or times the limit. limited: cycles in\n"
+        "which limits changed the tool's motion; others help: only the joints'. done:\n"
+        "part of the rule's twist. direction: from the rule's to the tool's velocity\n"
+        "while limited, median and 95 %. turns: rotation not asked for, then, rms.\n"
+        "error: at the end of a hold, median.",
+        highlight=False,
+    )
+    if arguments.format != "none":
+        print(f"time series: {out / experiment.robot}-limits-*.npz")
+    for picture in pictures:
+        print(f"picture: {picture}")
+    print(ex.save_limits_summary(rows, out / f"{experiment.robot}-limits.csv"))
+    return 0
 
 
 # --- robots

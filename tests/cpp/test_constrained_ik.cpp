@@ -314,7 +314,7 @@ TEST_CASE("time scaling: none where none is needed; all six rows exact: the path
   }
 }
 
-TEST_CASE("the largest error allowed is kept where it can be") {
+TEST_CASE("the largest error allowed is kept where it can be together with the exact part") {
   const Chain chain = arm("kuka_kr6_r900");
   JointLimits limits = chain.limits();
   limits.velocity.setConstant(0.5);
@@ -323,12 +323,13 @@ TEST_CASE("the largest error allowed is kept where it can be") {
   o.analytic = false;
   o.gamma = 0.1;
   o.max_error.tail<3>().setConstant(0.01);
+  o.acceleration_limits = false;  // with them a step that cannot see ahead is at times too fast to keep it
   ConstrainedIk ik(chain.with_limits(limits), o);
   JointVector home(6);
   home << 0.0, -1.3, 1.5, 0.0, 0.15, 0.0;
   ik.reset(home);
   const Pose start = ik.tip();
-  int active = 0;
+  int active = 0, lost = 0;
   double t = 0.0;
   for (int i = 0; i < 1500; ++i) {
     Twist by = Twist::Zero();
@@ -337,11 +338,14 @@ TEST_CASE("the largest error allowed is kept where it can be") {
     const ConstrainedIkStep step = ik.step(moved(start, by));
     t += (1.0 - step.time_scale) * o.dt;
     active += step.error_active;
-    if (step.exact_met && step.status != Status::BadInput) {
-      CHECK(step.path_error.tail<3>().cwiseAbs().maxCoeff() < 0.01 * 1.05);  // kept to the linearisation's error
-    }
+    CHECK(step.exact_met);
+    CHECK(step.path_error.head<3>().norm() < 1e-5);
+    const bool beyond = step.path_error.tail<3>().cwiseAbs().maxCoeff() > 0.01 * 1.05;  // the linearisation's error
+    lost += beyond;
+    CHECK((!beyond || step.error_active));
   }
   CHECK(active > 50);
+  CHECK(lost == 0);
 }
 
 TEST_CASE("torque limits are the dynamics', and come before the exact part") {

@@ -1,8 +1,12 @@
 // Eigen's own checks, over the library's sources: this executable compiles them itself, with assertions on and with
 // EIGEN_RUNTIME_NO_MALLOC. An allocation, a size that does not fit a bounded type or an index out of range aborts.
-// test_solver.cpp and test_servo.cpp count the heap calls of the library as it is shipped.
+// test_solver.cpp, test_servo.cpp and test_servo_limits.cpp count the heap calls of the library as it is shipped.
 #include <doctest/doctest.h>
 
+#include <limits>
+#include <string>
+
+#include <sigmaik/constrained_ik.hpp>
 #include <sigmaik/sigmaik.hpp>
 
 #include "random.hpp"
@@ -86,5 +90,85 @@ TEST_CASE("servos of every size pass Eigen's checks") {
         CHECK(std::isfinite(sum));
       }
     }
+  }
+}
+
+TEST_CASE("servos and constrained inverse kinematics with limits active pass Eigen's checks") {
+  test::Random random(3);
+  for (int n = 1; n <= sigmaik::kMaxJoints; ++n) {
+    const sigmaik::Chain plain = random.chain(n, 0.3);
+    sigmaik::JointLimits limits = plain.limits();
+    for (int i = 0; i < n; ++i) {
+      limits.velocity[i] = 0.1;
+      if (random.chance(0.5)) limits.acceleration[i] = 1.0;
+      if (random.chance(0.5)) limits.jerk[i] = 50.0;
+      if (plain.joint_types()[static_cast<std::size_t>(i)] == sigmaik::JointType::Continuous) continue;
+      limits.lower[i] = -0.02;
+      limits.upper[i] = 0.02;
+    }
+    const sigmaik::Chain chain = plain.with_limits(limits);
+    const sigmaik::JointVector zero = sigmaik::JointVector::Zero(n), moving = 0.05 * random.vector(n);
+    const sigmaik::Pose target = random.pose(3.0);
+    sigmaik::Pose wrong = target;
+    wrong.matrix()(0, 0) = std::numeric_limits<double>::quiet_NaN();
+    const sigmaik::Twist twist = random.vector(6);
+    for (const sigmaik::OnLimit on_limit : {sigmaik::OnLimit::Redistribute, sigmaik::OnLimit::Scale}) {
+      for (const sigmaik::Frame frame : {sigmaik::Frame::Base, sigmaik::Frame::Tool}) {
+        sigmaik::ServoOptions options;
+        options.on_limit = on_limit;
+        options.task.frame = frame;
+        if (frame == sigmaik::Frame::Tool) options.exact = {true, true, false, false, false, true};
+        sigmaik::Servo servo(chain, sigmaik::JParse{}, options);
+        servo.reset(zero, moving);
+        double sum = 0.0;
+        {
+          const NoMalloc none;
+          for (int cycle = 0; cycle < 100; ++cycle) {
+            sum += servo.update(target).qdot.sum() + servo.update_twist(twist).qdot.sum();
+            if (cycle % 30 == 29) sum += servo.update(wrong).qdot.sum();
+          }
+        }
+        CHECK(std::isfinite(sum));
+      }
+    }
+    for (const bool hard : {false, true}) {
+      sigmaik::ConstrainedIkOptions options;
+      if (hard) {
+        options.gamma = 1.0;
+        options.max_error.setConstant(0.01);
+        options.task.frame = sigmaik::Frame::Tool;
+      }
+      sigmaik::ConstrainedIk ik(chain, options);
+      ik.reset(zero, moving);
+      double sum = 0.0;
+      {
+        const NoMalloc none;
+        for (int cycle = 0; cycle < 50; ++cycle) sum += ik.step(cycle % 20 == 19 ? wrong : target).qdot.sum();
+      }
+      CHECK(std::isfinite(sum));
+    }
+  }
+}
+
+TEST_CASE("closed forms and torque limits in constrained inverse kinematics pass Eigen's checks") {
+  const std::string robots = SIGMAIK_ROBOTS_DIR;
+  for (const bool torque : {false, true}) {
+    const sigmaik::Chain chain =
+        sigmaik::Chain::from_urdf(robots + (torque ? "/franka_panda.urdf" : "/puma560.urdf"), "", "flange");
+    sigmaik::ConstrainedIkOptions options;
+    options.torque_limits = torque;
+    options.gamma = 1.0;
+    sigmaik::ConstrainedIk ik(chain, options);
+    CHECK(ik.has_analytic() == !torque);
+    const sigmaik::JointVector start = 0.5 * (chain.limits().lower + chain.limits().upper);
+    sigmaik::Pose near = pose(chain, sigmaik::JointVector(start.array() + 0.2)), far = near;
+    far.translation() *= 5.0;
+    ik.reset(start);
+    double sum = 0.0;
+    {
+      const NoMalloc none;
+      for (int cycle = 0; cycle < 400; ++cycle) sum += ik.step(cycle < 200 ? near : far).qdot.sum();
+    }
+    CHECK(std::isfinite(sum));
   }
 }

@@ -14,7 +14,7 @@
 /// Rotations are not linearised as if they were vectors: for φ = log(R R_dᵀ), φ̇ = J_l⁻¹(φ) ω, exactly, so that large
 /// errors converge as fast as small ones.
 ///
-/// Where not everything can be had, limits come first, then torques and the largest errors allowed, then the exact part,
+/// Where not everything can be had, limits come first, then torques, then the exact part, then the largest errors allowed,
 /// then the rest: there is always an answer.
 
 #include <array>
@@ -39,9 +39,12 @@ struct ConstrainedIkOptions {
   Task task{};        ///< rows that matter at all, and their axes
   std::array<bool, 6> exact{true, true, true, false, false, false};  ///< of these, the rows to be met exactly
   Twist alpha = Twist::Ones();            ///< ≥ 0, weights of the error [1/m, 1/rad]
-  Twist beta = Twist::Constant(5.0);      ///< ≥ 0, weights of the error's change in a cycle [1/m, 1/rad]
+  /// ≥ 0, weights of the error's change in a cycle [1/m, 1/rad]. Errors decay in about dt (α²+β²)/α²: 5 √(1 ms/dt) gives
+  /// 25 ms at any dt.
+  Twist beta = Twist::Constant(5.0);
   std::optional<double> gamma{};          ///< > 0, weight of the time scaling ϑ; none: ϑ = 0
-  /// > 0, largest error of the approximate rows [m, rad]; infinite for none.
+  /// > 0, largest error of the approximate rows [m, rad], each for itself; infinite for none. Let go, and said so, where
+  /// it cannot be had together with the exact part.
   Twist max_error = Twist::Constant(std::numeric_limits<double>::infinity());
   int iterations = 2;          ///< ≥ 1, linearisations a step
   bool torque_limits = false;  ///< hold the chain's effort limits: M q̈ + C q̇ + g, with the inertias of the chain
@@ -72,7 +75,7 @@ struct ConstrainedIkStep {
   double time_scale = 0.0;            ///< ϑ in [0, 1]: 0 as asked, 1 a complete stop; how hard the step is
   std::uint16_t active = 0;           ///< bit i: a limit of joint i is active
   bool torque_active = false;         ///< a torque limit is active, or cannot be met
-  bool error_active = false;          ///< max_error is active, or cannot be met
+  bool error_active = false;          ///< max_error is active, or has been let go
   bool exact_met = true;              ///< the exact part's linearised equations hold
   IkSource used = IkSource::Optimised;
 };
@@ -118,7 +121,7 @@ class ConstrainedIk {
   int torque_rows_ = 0, error_rows_ = 0;
   ChainState state_;
   Pose reference_ = Pose::Identity();
-  bool last_free_ = true;  // the last step was closed form, or met no limit
+  bool last_free_ = true;  // the last step was closed form, or met no limit and agreed with it
 };
 
 }  // namespace sigmaik

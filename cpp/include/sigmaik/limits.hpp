@@ -80,6 +80,10 @@ class LimitTracker {
   /// Of the coming cycle; empty before reset().
   const VelocityBounds& bounds() const noexcept { return bounds_; }
 
+  /// What position and velocity limits alone allow, with room to stop: where a joint may be heading, although it takes
+  /// acceleration, and time, to get there. lower ≤ upper. Real time.
+  VelocityBounds heading() const noexcept;
+
   /// (n,) [rad/s or m/s], inside the bounds: the coming cycle of the fastest stop.
   const JointVector& stop() const noexcept { return stop_; }
 
@@ -116,7 +120,12 @@ class LimitTracker {
     double next = 0.0;       // its velocity then
   };
 
+  template <int kPadded>
+  void move(const JointVector& qdot) noexcept;
+  template <int kPadded>
+  unsigned survey() noexcept;
   void update() noexcept;
+  double towards(const Joint& joint, double room) const noexcept;
   void bound(int i) noexcept;
   void bound_with_jerk(int i) noexcept;
 
@@ -124,6 +133,11 @@ class LimitTracker {
   double per_dt_;
   int n_ = 0;
   std::array<Joint, kMaxJoints> joints_{};
+  // The same by kind, for joints far from all limits, which is most of them, most of the time. Acceleration is infinite
+  // where there is more to it.
+  using Numbers = Eigen::Array<double, kMaxJoints, 1>;
+  Numbers lower_, upper_, velocity_, acceleration_;
+  bool has_jerk_ = false;
   JointVector q_, v_, stop_;
   VelocityBounds bounds_;
   std::uint16_t outside_ = 0, recovering_ = 0;

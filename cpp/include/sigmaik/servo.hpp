@@ -16,9 +16,16 @@
 namespace sigmaik {
 
 /// What gives way where a joint limit would be broken. While none would be, the rule's answer stands, to the last digit.
+///
+/// Position and velocity limits decide where the arm is heading. Acceleration and jerk limits decide how fast it gets
+/// there: in proportion, all joints together, from the last command towards the new one, so that the tool does not veer
+/// off while it speeds up. Where that would break a limit, as where one joint brakes as hard as it can, the others make
+/// the best of it.
 enum class OnLimit {
   /// Other joints take over: of all that the limits allow, the velocities whose twist is nearest to the rule's, and of
-  /// these the nearest to the rule's own. Along directions that are singular, those alone.
+  /// these the nearest to the rule's own, to about 1e-5 of the twist away from singularities. A singular direction counts
+  /// as one at the rule's threshold, so that little is not made up for by much. J-PARSE's answer, so limited, still never
+  /// moves the tool away from its target where the limits allow to rest.
   Redistribute,
   Scale,  ///< direction kept, speed given up: all joints slow down together
 };
@@ -104,9 +111,9 @@ class Servo {
   ServoStep stop(Status status) noexcept;
   ServoStep resolve(const Twist& twist, bool fade) noexcept;
   JointVector posture_velocity() const noexcept;
-  void redistribute(ServoStep& step) noexcept;
-  void scale(ServoStep& step) const noexcept;
-  void take(ServoStep& step) noexcept;
+  void limit(ServoStep& step) noexcept;
+  JointVector redistribute(const JointVector& qdot, const VelocityBounds& bounds, ServoStep& step) noexcept;
+  void take(ServoStep& step, bool achieved) noexcept;
 
   Chain chain_;
   ServoOptions options_;

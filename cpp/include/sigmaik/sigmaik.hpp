@@ -9,15 +9,17 @@
 ///     chain.hpp            Chain: the arm, immutable; from URDF     kdl.hpp     from and to KDL::Chain (not included)
 ///     pose.hpp             rotation_log, rotation_exp, pose_error
 ///     kinematics.hpp       update(chain, q, state): pose and Jacobian; jacobian_gradient
-///     analytic_ik.hpp      AnalyticIk: every posture of a pose, for six joints with a spherical wrist
 ///     spectrum.hpp         Spectrum: singular value decomposition with a warm start
 ///     inverse.hpp          JParse, DampedLeastSquares, …: one rule per singular direction
 ///     task.hpp             Task: which rows of a twist, in which axes
 ///     velocity_solver.hpp  VelocitySolver: rule and posture → Solution
 ///     batch.hpp            solve_batch: many at once
 ///     limits.hpp           LimitTracker: position, velocity, acceleration and jerk limits → this cycle's bounds
+///     least_squares.hpp    LeastSquares: equalities, bounds and inequalities, always with an answer
 ///     servo.hpp            Servo: pose or twist in, joint command out, each cycle
-///     dynamics.hpp         Dynamics: mass matrix, Coriolis, gravity, by KDL; not real time (not included)
+///     analytic_ik.hpp      AnalyticIk: every posture of a pose, for six joints with a spherical wrist
+///     dynamics.hpp         Dynamics: mass matrix, Coriolis, gravity, by KDL (not included)
+///     constrained_ik.hpp   ConstrainedIk: a pose exactly in part, the rest as limits allow; time scaling (not included)
 ///
 /// Set-up throws Error. Calls marked "real time" are noexcept, bounded, and touch neither heap nor lock.
 
@@ -27,6 +29,7 @@
 #include <sigmaik/error.hpp>
 #include <sigmaik/inverse.hpp>
 #include <sigmaik/kinematics.hpp>
+#include <sigmaik/least_squares.hpp>
 #include <sigmaik/limits.hpp>
 #include <sigmaik/pose.hpp>
 #include <sigmaik/servo.hpp>

@@ -48,6 +48,7 @@ __all__ = [
     "Settings",
     "Summary",
     "Track",
+    "headline",
     "motion",
     "run",
     "save_summary",
@@ -68,7 +69,7 @@ VARIANTS = {
     "constrained": "constrained",
     "no-beta": "constrained, β = 0",
     "scaled": "time scaling",
-    "scaled-exact": "time scaling, all exact",
+    "scaled-exact": "scaled, all exact",
 }
 
 # Forearm level and pointing ahead where axis 5 passes zero; raised by 20° where the tip goes across, so that
@@ -93,7 +94,7 @@ class Settings:
 
     @property
     def error_rate_weight(self) -> float:
-        """β. By default 5 at 1 ms and ∝ 1/√dt: an error decays by 1/e in about β² samples, which is 25 ms."""
+        """β. By default 5 at 1 ms, ∝ 1/√dt: an error decays to 1/e in about β² samples, which is 25 ms."""
         return 5.0 * math.sqrt(1e-3 / self.dt) if self.beta is None else self.beta
 
     @property
@@ -150,17 +151,20 @@ class Track:
     @property
     def t(self) -> Array:
         """(N,) [s]"""
-        return np.arange(len(self.q)) * self.settings.dt
+        t: Array = np.arange(len(self.q), dtype=np.float64) * self.settings.dt
+        return t
 
     @property
     def qdot(self) -> Array:
         """(N, 6) [rad/s] over the sample before."""
-        return np.diff(self.q, axis=0, prepend=self.q[:1]) / self.settings.dt
+        speed: Array = np.diff(self.q, axis=0, prepend=self.q[:1]) / self.settings.dt
+        return speed
 
     @property
     def qddot(self) -> Array:
         """(N, 6) [rad/s²], change of speed from the sample before."""
-        return np.diff(self.qdot, axis=0, prepend=np.zeros((1, 6))) / self.settings.dt
+        acceleration: Array = np.diff(self.qdot, axis=0, prepend=np.zeros((1, 6))) / self.settings.dt
+        return acceleration
 
     @property
     def position_error(self) -> Array:
@@ -187,7 +191,7 @@ def motion(
     if example not in EXAMPLES:
         raise ValueError(f"example must be 1 or 2, not {example}")
     first = example == 1
-    distance = (0.2 if first else 0.2) if distance is None else distance
+    distance = 0.2 if distance is None else distance
     duration = (2.0 if first else 0.5) if duration is None else duration
     offset = (math.radians(1.0) if first else 0.0) if offset is None else offset
     for name, value in (("distance", distance), ("duration", duration)):
@@ -290,7 +294,12 @@ class _Recorder:
         self._error_active, self._exact_met = [False], [True]
 
     def add(
-        self, clock: float, q: Array, error: Array, path_error: Array, step: sk.ConstrainedIkStep | None = None
+        self,
+        clock: float,
+        q: Array,
+        error: Array,
+        path_error: Array,
+        step: sk.ConstrainedIkStep | None = None,
     ) -> None:
         self._clock.append(clock)
         self._q.append(q)
@@ -412,7 +421,8 @@ def save_summary(rows: Iterable[Summary], file: str | pathlib.Path) -> pathlib.P
     lines: list[list[object]] = []
     columns: list[str] = []
     for row in rows:
-        columns, line = [], []
+        line: list[object] = []
+        columns = []
         for name, value in dataclasses.asdict(row).items():
             if isinstance(value, tuple):
                 columns += [f"{name}_{j + 1}" for j in range(len(value))]
@@ -483,13 +493,25 @@ def _write_csv(stream: BinaryIO, columns: Sequence[str], rows: Iterable[Sequence
 # --- tables
 
 
+def headline(motion: Motion, settings: Settings) -> str:
+    """What is run, in two lines."""
+    way = "there and back, close by" if motion.back else "straight across"
+    cap = settings.max_error
+    most = "any" if cap is None or math.isinf(cap) else f"at most {math.degrees(cap):g}° about each axis"
+    return (
+        f"{ROBOT}, example {motion.example}: {way} the axis-5 singularity\n"
+        f"{motion.distance:g} m in {motion.duration:g} s, axis 5 {math.degrees(motion.offset):g}° from zero, "
+        f"dt = {1e3 * settings.dt:g} ms,\nβ = {settings.error_rate_weight:.3g}, "
+        f"γ = {settings.time_scaling_weight:.3g}, orientation error {most}"
+    )
+
+
 def summary_table(rows: Sequence[Summary]) -> Table:
     """Limits and errors: a line per variant, for 80 characters. What is beyond a limit is red."""
     from rich.text import Text
 
-    heads = ("time\ns", "largest\nspeed\n/limit", "largest\naccel.\n/limit", "beyond\nlimits\nsamples")
-    heads += ("position\nerror\nµm", "ori.\nerror\n°", "largest\nϑ\n")
-    table = _table(heads)
+    heads = ("\ntime\ns", "top\nspeed\n/limit", "top\naccel.\n/limit", "be-\nyond\nlimits")
+    table = _table((*heads, "pos.\nerror\nµm", "ori.\nerror\n°", "top\nϑ\n"))
     for row in rows:
         speed, acceleration = max(row.speed_ratio), max(row.acceleration_ratio)
         beyond = row.speed_beyond + row.acceleration_beyond
@@ -508,9 +530,8 @@ def summary_table(rows: Sequence[Summary]) -> Table:
 
 def smoothness_table(rows: Sequence[Summary]) -> Table:
     """Switching, and how smooth axis 4 is: a line per variant, for 80 characters."""
-    heads = ("opti-\nmised\n%", "switch-\nes\n", "first\n\ns", "last\n\ns")
-    heads += ("axis 4:\nrever-\nsals", "speed\nvaries\nrad/s", "rms\njerk\nrad/s³")
-    table = _table(heads)
+    heads = ("opti-\nmised\n%", "swit-\nches\n", "\nfirst\ns", "\nlast\ns")
+    table = _table((*heads, "axis 4:\nrever-\nsals", "speed\nvaries\nrad/s", "rms\njerk\nrad/s³"))
     for row in rows:
         table.add_row(
             VARIANTS[row.variant],

@@ -1,9 +1,9 @@
 """A rule with joint limits: what limits cost, and what breaks without them.
 
-Three scenarios, each driven in several ways: a target beyond reach, targets beyond joint limits, and random twists
-like those of teleoperation. A kinematic simulation: the arm does what it is told for 1/rate.
+Three scenarios, each driven in several ways: a target beyond reach, targets beyond joint limits, and random
+twists like those of teleoperation. A kinematic simulation: the arm does what it is told for 1/rate.
 
-Units: m, rad, s. Limits of joints: position [rad or m], speed [rad/s or m/s], acceleration [rad/s² or m/s²], jerk.
+Units: m, rad, s; of prismatic joints m where rad is said of joints.
 """
 
 from __future__ import annotations
@@ -40,6 +40,7 @@ __all__ = [
     "load_limits",
     "save_limits_summary",
     "save_traces",
+    "shown_trial",
     "summarize_limits",
 ]
 
@@ -55,16 +56,19 @@ VARIANTS: dict[str, str] = {
 }
 #: What is driven.
 SCENARIOS: dict[str, str] = {
-    "beyond reach": "a target 0.5 m out of reach: jumps there, is held, wanders, and is released",
-    "beyond limits": "poses of configurations beyond a joint limit: pushed towards, held, and left again",
+    "beyond reach": "a target 0.5 m out of reach: held, wandering, released",
+    "beyond limits": "poses of configurations 0.3 rad beyond a limit: held, left",
     "teleoperation": "random twists, band-limited and saturating",
 }
 
 BEYOND_REACH = 0.5  #: [m]
-BEYOND_LIMIT = 0.3  #: [rad or m] as far inside a joint limit as the arm starts, and beyond it as the pose asks
+#: [rad or m] as far inside a joint limit as the arm starts, and beyond it as the pose asks.
+BEYOND_LIMIT = 0.3
 SATURATION = (0.5, 1.5)  #: [m/s, rad/s] longest twists of the teleoperation
 BAND = 1.0  #: [Hz] and slower: what a hand does
-#: Beyond a limit by less, of the limit, is rounding.
+#: A tool that misses this part of the rule's twist does not do what it is told.
+MISSED = 1e-3
+#: Beyond a limit by less, of the limit, is rounding: that of finite differences.
 TOLERANCE = 1e-7
 
 
@@ -143,7 +147,14 @@ class Trace:
     error: Array  #: (N, 6) target minus tip [m, rad]; zero for twists
     tip: Array  #: (N, 3) [m]
     rule: Array  #: (N, 6) twist that the rule alone gives in this state
-    limited: NDArray[np.bool_]  #: (N,) a limit changed the command
+    held: NDArray[np.bool_]  #: (N,) a limit changed the command
+
+    @property
+    def limited(self) -> NDArray[np.bool_]:
+        """(N,) a limit changed the tool's motion, by more than a thousandth of the rule's."""
+        missed = np.linalg.norm(self.achieved - self.rule, axis=1)
+        limited: NDArray[np.bool_] = self.held & (missed > MISSED * np.linalg.norm(self.rule, axis=1))
+        return limited
 
     @property
     def t(self) -> Array:
@@ -178,9 +189,9 @@ class Trace:
 class LimitsSummary:
     """A variant in a scenario, all trials together. NaN where there is nothing to say.
 
-    Broken limits are counted per joint and cycle; worst is the largest excess of positions [rad or m], and the largest
-    ratio to the limit of the others, of the share that the arm has limits for. What a limit costs is measured against
-    the rule alone in the same state, where a limit changed the command.
+    Broken limits are counted per joint and cycle; worst is the largest excess of positions [rad or m], and
+    the largest ratio to the limit of the others. What limits cost is measured against the rule alone in the same
+    state, in the cycles where limits changed the tool's motion.
     """
 
     scenario: str
@@ -195,13 +206,16 @@ class LimitsSummary:
     acceleration_worst: float
     jerk_broken: int
     jerk_worst: float
-    limited: float  #: share of cycles in which a limit changed the command
-    achieved: float  #: of the rule's twist, along itself, over all cycles
+    limited: float  #: share of cycles in which limits changed the tool's motion
+    taken_over: float  #: share of cycles in which limits changed the joints' motion, but not the tool's
+    achieved: float  #: part of the rule's twist, along itself, over all cycles
     direction_error: float  #: [rad] angle between the rule's and the achieved velocity of the tool, median
     direction_error_worst: float  #: [rad] the same, of 95 % of these cycles
     turning_error: float  #: [rad/s] rotation that the rule did not ask for, root mean square
     acceleration_peak: float  #: [rad/s² or m/s²]
     acceleration_rms: float
+    hold_error: float  #: [m] distance to the target at the end of a hold, median of the trials
+    hold_angle: float  #: [rad] the same of the orientation
     rest_speed: float  #: [rad/s or m/s] root mean square of q̇ at the end of a hold
     rest_speed_peak: float  #: the largest |q̇| then
     resume_time: float  #: [s] after release until a tenth of the way back is done, the longest
@@ -217,9 +231,17 @@ def load_limits(
     base: str | None = None,
     tip: str | None = None,
 ) -> LimitsExperiment:
-    """The experiment with a shipped arm, or a URDF file; see `LimitsSettings`. ValueError where a part is wrong."""
+    """The experiment with a shipped arm, or a URDF file. ValueError where a part is wrong."""
     settings = settings or LimitsSettings()
-    for name in ("rate", "seconds", "pace", "gain_linear", "gain_angular", "max_linear_error", "max_angular_error"):
+    for name in (
+        "rate",
+        "seconds",
+        "pace",
+        "gain_linear",
+        "gain_angular",
+        "max_linear_error",
+        "max_angular_error",
+    ):
         value = getattr(settings, name)
         if not 0.0 < value < math.inf:
             raise ValueError(f"{name} must be positive and finite, not {value:g}")
@@ -255,7 +277,9 @@ def _beyond_reach(chain: sk.Chain, home: Array, settings: LimitsSettings) -> Ite
         counts = [_count(settings, settings.pace * s) for s in (0.5, 8.0, 5.0, 8.0)]
         far = start.copy()
         far[:3, 3] = (reach + BEYOND_REACH) * direction
-        poses = np.concatenate([np.broadcast_to(p, (c, 4, 4)) for p, c in zip((start, far, far, start), counts)])
+        poses = np.concatenate(
+            [np.broadcast_to(p, (c, 4, 4)) for p, c in zip((start, far, far, start), counts, strict=True)]
+        )
         wander = slice(sum(counts[:2]), sum(counts[:3]))
         fade = np.sin(np.linspace(0.0, math.pi, counts[2]))[:, None]
         poses[wander, :3, 3] += 0.3 * fade * _noise(rng, counts[2], 3, settings.rate)
@@ -277,7 +301,10 @@ def _beyond_limits(chain: sk.Chain, home: Array, settings: LimitsSettings) -> It
             beyond[joint] = limit + sign * BEYOND_LIMIT
             counts = [_count(settings, settings.pace * s) for s in (3.0, 3.0)]
             poses = np.concatenate(
-                [np.broadcast_to(chain.pose(q), (c, 4, 4)) for q, c in zip((beyond, start), counts, strict=True)]
+                [
+                    np.broadcast_to(chain.pose(q), (c, 4, 4))
+                    for q, c in zip((beyond, start), counts, strict=True)
+                ]
             )
             side = "lower" if sign < 0.0 else "upper"
             yield Trial(f"{name} {side}", start, poses, _phases(("hold", "return"), counts))
@@ -300,7 +327,8 @@ def _noise(rng: np.random.Generator, count: int, columns: int, rate: float) -> A
     frequency = np.fft.rfftfreq(count, 1.0 / rate)
     spectrum[(frequency > max(BAND, 2.0 * rate / count)) | (frequency == 0.0)] = 0.0
     noise: Array = np.fft.irfft(spectrum, count, axis=0)
-    return noise / np.maximum(noise.std(axis=0), 1e-300)
+    noise /= np.maximum(noise.std(axis=0), 1e-300)
+    return noise
 
 
 def _count(settings: LimitsSettings, seconds: float) -> int:
@@ -326,10 +354,10 @@ def drive(
     if variant not in VARIANTS:
         raise ValueError(f"no variant '{variant}'; there are {', '.join(VARIANTS)}")
     loop = _clamped if variant == "clamp" else _served
-    q, qdot, error, limited = loop(experiment, trial, variant, progress)
+    q, qdot, error, held = loop(experiment, trial, variant, progress)
     tip: Array = np.concatenate([experiment.chain.pose(q[:-1][p])[:, :3, 3] for p in _parts(len(qdot))])
     rule = _rule(experiment, trial, q[:-1], error)
-    return Trace(experiment, scenario, trial, variant, q, qdot, error, tip, rule, limited)
+    return Trace(experiment, scenario, trial, variant, q, qdot, error, tip, rule, held)
 
 
 _Loop = tuple[Array, Array, Array, NDArray[np.bool_]]
@@ -339,7 +367,7 @@ def _served(
     experiment: LimitsExperiment, trial: Trial, variant: str, progress: Callable[[int], None] | None
 ) -> _Loop:
     s = experiment.settings
-    held = variant != "none"
+    on = variant != "none"
     servo = sk.Servo(
         experiment.chain,
         experiment.method.method,
@@ -349,25 +377,25 @@ def _served(
         max_linear_error=s.max_linear_error,
         max_angular_error=s.max_angular_error,
         soft_start=s.soft_start,
-        position_limits=held,
-        velocity_limits=held,
-        acceleration_limits=held,
-        jerk_limits=held,
+        position_limits=on,
+        velocity_limits=on,
+        acceleration_limits=on,
+        jerk_limits=on,
         on_limit="scale" if variant == "scale" else "redistribute",
         exact=(1, 1, 1, 0, 0, 0) if variant == "position first" else None,
     )
     servo.reset(trial.start)
-    q, qdot, error, limited = _empty(experiment, trial)
+    q, qdot, error, held = _empty(experiment, trial)
     update = servo.update if trial.by_pose else servo.update_twist
     for k, command in enumerate(trial.commands):
         step = update(command)
         q[k + 1], qdot[k] = step.q, step.qdot
-        limited[k] = step.status == sk.Status.LIMITED or bool(step.limiting_joints)
+        held[k] = step.status == sk.Status.LIMITED or bool(step.limiting_joints)
         if trial.by_pose:
             error[k] = step.pose_error
         if progress is not None and k % 500 == 499:
             progress(500)
-    return q, qdot, error, limited
+    return q, qdot, error, held
 
 
 def _clamped(
@@ -378,7 +406,7 @@ def _clamped(
     limits = chain.limits
     lower, upper, speed = limits.lower, limits.upper, limits.velocity
     solver = sk.VelocitySolver(experiment.method.method)
-    q, qdot, error, limited = _empty(experiment, trial)
+    q, qdot, error, held = _empty(experiment, trial)
     for k, command in enumerate(trial.commands):
         here = q[k]
         if trial.by_pose:
@@ -389,10 +417,10 @@ def _clamped(
         asked = solver.solve(chain.jacobian(here), twist).qdot
         ahead = np.clip(here + dt * np.clip(asked, -speed, speed), lower, upper)
         q[k + 1], qdot[k] = ahead, (ahead - here) / dt
-        limited[k] = bool(np.any(np.abs(qdot[k] - asked) > 1e-9 * (1.0 + np.abs(asked))))
+        held[k] = bool(np.any(np.abs(qdot[k] - asked) > 1e-9 * (1.0 + np.abs(asked))))
         if progress is not None and k % 500 == 499:
             progress(500)
-    return q, qdot, error, limited
+    return q, qdot, error, held
 
 
 def _empty(experiment: LimitsExperiment, trial: Trial) -> _Loop:
@@ -434,6 +462,13 @@ def _parts(count: int, size: int = 10_000) -> Iterator[slice]:
 # --- figures
 
 
+def shown_trial(scenario: str, trials: Sequence[Trial]) -> int:
+    """Which trial of a scenario makes a picture: the second direction, the second joint's upper limit."""
+    names = [trial.name for trial in trials]
+    upper = [i for i, name in enumerate(names) if name.endswith("upper")]
+    return upper[min(1, len(upper) - 1)] if scenario == "beyond limits" and upper else min(1, len(names) - 1)
+
+
 def summarize_limits(traces: Sequence[Trace]) -> LimitsSummary:
     """All trials of one variant in one scenario."""
     first = traces[0]
@@ -444,7 +479,7 @@ def summarize_limits(traces: Sequence[Trace]) -> LimitsSummary:
     acceleration = [np.abs(t.acceleration) / limits.acceleration for t in traces]
     jerk = [np.abs(t.jerk) / limits.jerk for t in traces]
 
-    limited = np.concatenate([t.limited for t in traces])
+    limited, held = np.concatenate([t.limited for t in traces]), np.concatenate([t.held for t in traces])
     rule = np.concatenate([t.rule for t in traces])
     achieved = np.concatenate([t.achieved for t in traces])
     asked = np.linalg.norm(rule[:, :3], axis=1)
@@ -457,8 +492,11 @@ def summarize_limits(traces: Sequence[Trace]) -> LimitsSummary:
     qddot = np.concatenate([t.acceleration for t in traces])
 
     holds = [t.trial.phase("hold") for t in traces]
-    tails = [t.qdot[h][-max(1, (h.stop - h.start) // 4) :] for t, h in zip(traces, holds, strict=True) if h.stop]
+    tails = [
+        t.qdot[h][-max(1, (h.stop - h.start) // 4) :] for t, h in zip(traces, holds, strict=True) if h.stop
+    ]
     rest = np.concatenate(tails) if tails else np.full((1, 1), math.nan)
+    held_at = [t.error[h.stop - 1] for t, h in zip(traces, holds, strict=True) if h.stop]
     returns = [(t, t.trial.phase("return")) for t in traces]
     returns = [(t, phase) for t, phase in returns if phase.stop]
     resumed = [_resume(t.error[phase], rate) for t, phase in returns]
@@ -478,12 +516,15 @@ def summarize_limits(traces: Sequence[Trace]) -> LimitsSummary:
         jerk_broken=_broken(jerk),
         jerk_worst=max(float(x.max()) for x in jerk),
         limited=float(limited.mean()),
+        taken_over=float((held & ~limited).mean()),
         achieved=float(np.sum(rule * achieved) / max(np.sum(rule * rule), 1e-300)),
         direction_error=_quantile(angle, 0.5),
         direction_error_worst=_quantile(angle, 0.95),
         turning_error=float(np.sqrt(np.mean(turning**2))) if len(turning) else math.nan,
         acceleration_peak=float(np.abs(qddot).max()),
         acceleration_rms=float(np.sqrt(np.mean(qddot**2))),
+        hold_error=_quantile(np.array([float(np.linalg.norm(e[:3])) for e in held_at]), 0.5),
+        hold_angle=_quantile(np.array([float(np.linalg.norm(e[3:])) for e in held_at]), 0.5),
         rest_speed=float(np.sqrt(np.mean(rest**2))),
         rest_speed_peak=float(np.abs(rest).max()),
         resume_time=max(resumed, default=math.nan),
@@ -533,15 +574,17 @@ def save_limits_summary(rows: Sequence[LimitsSummary], file: str | pathlib.Path)
 
 
 def save_traces(traces: Sequence[Trace], file: str | pathlib.Path) -> pathlib.Path:
-    """An npz file of one variant in one scenario: per trial i q_i (N + 1, n), qdot_i (N, n), error_i (N, 6), tip_i (N, 3),
-    rule_i (N, 6), limited_i (N,), and trials, phases (JSON), joint_names, limits (5, n: lower, upper, velocity,
-    acceleration, jerk), settings (JSON), version. numpy.load(file) reads it.
+    """An npz file of one variant in one scenario, which numpy.load(file) reads.
+
+    Per trial i q_i (N + 1, n), qdot_i (N, n), error_i (N, 6), tip_i (N, 3), rule_i (N, 6), held_i (N,), as in
+    `Trace`; trials, phases (JSON), joint_names, limits (5, n: lower, upper, velocity, acceleration, jerk),
+    settings (JSON) and version.
     """
     first = traces[0]
     limits = first.experiment.chain.limits
     arrays: dict[str, NDArray[np.generic]] = {}
     for i, trace in enumerate(traces):
-        for name in ("q", "qdot", "error", "tip", "rule", "limited"):
+        for name in ("q", "qdot", "error", "tip", "rule", "held"):
             arrays[f"{name}_{i}"] = getattr(trace, name)
     arrays["trials"] = np.array([trace.trial.name for trace in traces])
     arrays["phases"] = np.array(
@@ -553,4 +596,8 @@ def save_traces(traces: Sequence[Trace], file: str | pathlib.Path) -> pathlib.Pa
     )
     arrays["settings"] = np.array(json.dumps(dataclasses.asdict(first.experiment.settings)))
     arrays["version"] = np.array(sk.__version__)
-    return write_atomically(pathlib.Path(file), lambda stream: np.savez_compressed(stream, **arrays))  # type: ignore[arg-type]
+
+    def write(stream: BinaryIO) -> None:
+        np.savez_compressed(stream, **arrays)  # type: ignore[arg-type]
+
+    return write_atomically(pathlib.Path(file), write)

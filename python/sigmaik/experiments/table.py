@@ -9,10 +9,11 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
+from .limits import LimitsSummary
 from .reach import Experiment
 from .summary import Summary
 
-__all__ = ["summary_table"]
+__all__ = ["broken_table", "cost_table", "hold_table", "summary_table"]
 
 _HEADS = (
     "pos.\nerror\nmm",
@@ -97,3 +98,109 @@ def _compact(value: float) -> str:
 
 def _ratio(value: float) -> str:
     return f"{value:.4f}" if value >= 1e-3 or value == 0.0 else f"{value:.0e}"
+
+
+def broken_table(rows: Sequence[LimitsSummary]) -> Table:
+    """How often limits were broken, joints times cycles, and by how much at worst. Broken ones are red."""
+    table = _limits_table("limits broken")
+    jerk = any(row.jerk_worst > 0.0 for row in rows)
+    heads = [
+        "position\nbroken",
+        "by at\nmost",
+        "speed\nbroken",
+        "× the\nlimit",
+        "accel.\nbroken",
+        "× the\nlimit",
+    ]
+    heads += ["jerk\nbroken", "× the\nlimit"] if jerk else []
+    for head in heads + ["accel.\npeak", "accel.\nrms"]:
+        table.add_column(head, justify="right", no_wrap=True)
+    for i, row in enumerate(rows):
+        pairs = [
+            (row.position_broken, row.position_excess),
+            (row.speed_broken, row.speed_worst),
+            (row.acceleration_broken, row.acceleration_worst),
+        ]
+        pairs += [(row.jerk_broken, row.jerk_worst)] if jerk else []
+        cells = [
+            Text(cell, style="red" if count else "")
+            for count, worst in pairs
+            for cell in (str(count), _compact(worst))
+        ]
+        _add(table, rows, i, [*cells, _compact(row.acceleration_peak), _compact(row.acceleration_rms)])
+    return table
+
+
+def cost_table(rows: Sequence[LimitsSummary]) -> Table:
+    """What limits cost: how much of the rule's twist is done, and how the tool's motion differs from it."""
+    table = _limits_table("what it costs")
+    for head in (
+        "limited\n%",
+        "others\nhelp %",
+        "done\n%",
+        "direction\n°",
+        "\n95 %, °",
+        "turns\nrad/s",
+    ):
+        table.add_column(head, justify="right", no_wrap=True)
+    for i, row in enumerate(rows):
+        cells = [
+            _compact(100.0 * row.limited),
+            _compact(100.0 * row.taken_over),
+            _compact(100.0 * row.achieved),
+            _compact(math.degrees(row.direction_error)),
+            _compact(math.degrees(row.direction_error_worst)),
+            _compact(row.turning_error),
+        ]
+        _add(table, rows, i, cells)
+    return table
+
+
+def hold_table(rows: Sequence[LimitsSummary]) -> Table:
+    """How still a hold was, and how the arm came back after the release."""
+    table = _limits_table("hold and release")
+    for head in (
+        "error\nmm",
+        "\n°",
+        "rms at rest\nrad/s",
+        "peak\nrad/s",
+        "resumes\nafter s",
+        "peak\nrad/s",
+        "came\nback",
+    ):
+        table.add_column(head, justify="right", no_wrap=True)
+    rows = [row for row in rows if row.trials]
+    for i, row in enumerate(rows):
+        cells = [
+            _compact(1e3 * row.hold_error),
+            _compact(math.degrees(row.hold_angle)),
+            f"{row.rest_speed:.4f}",
+            f"{row.rest_speed_peak:.4f}",
+            _compact(row.resume_time),
+            _compact(row.resume_speed),
+            f"{row.returned}/{row.trials}",
+        ]
+        _add(table, rows, i, cells)
+    return table
+
+
+def _limits_table(title: str) -> Table:
+    table = Table(
+        title=title,
+        title_justify="left",
+        title_style="bold",
+        box=box.SIMPLE_HEAD,
+        padding=(0, 1, 0, 0),
+        pad_edge=False,
+    )
+    table.add_column("", no_wrap=True)
+    return table
+
+
+def _add(table: Table, rows: Sequence[LimitsSummary], i: int, cells: Sequence[Text | str]) -> None:
+    """A scenario's name has a line of its own, above its variants."""
+    row = rows[i]
+    if i == 0 or rows[i - 1].scenario != row.scenario:
+        table.add_row(Text(row.scenario, style="bold"))
+    ends = i + 1 == len(rows) or rows[i + 1].scenario != row.scenario
+    table.add_row(f" {row.variant}", *cells, end_section=ends)

@@ -1,0 +1,719 @@
+// What limits make of the servo's command: nothing while none is met; else the best that is left, without jumps; and a
+// way back from outside. The limits themselves are test_limits.cpp's.
+
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <functional>
+#include <limits>
+#include <map>
+
+#include <Eigen/SVD>
+
+#include <sigmaik/constrained_ik.hpp>
+#include <sigmaik/pose.hpp>
+#include <sigmaik/least_squares.hpp>
+#include <sigmaik/servo.hpp>
+
+#include "heap.hpp"
+#include "random.hpp"
+
+namespace {
+
+using namespace sigmaik;
+using test::MatrixXd;
+using test::Random;
+using test::VectorXd;
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+const std::map<std::string, Chain>& arms() {
+  static const std::map<std::string, Chain> all = [] {
+    std::map<std::string, Chain> found;
+    for (const auto& entry : std::filesystem::directory_iterator(SIGMAIK_ROBOTS_DIR)) {
+      if (entry.path().extension() != ".urdf") continue;
+      found.emplace(entry.path().stem().string(), Chain::from_urdf(entry.path().string(), "", "flange"));
+    }
+    return found;
+  }();
+  return all;
+}
+
+std::vector<Method> some_methods() {
+  return {PseudoInverse{}, DampedLeastSquares{}, AdaptiveDampedLeastSquares{}, SelectivelyDampedLeastSquares{},
+          JParse{},        JacobianProjection{}, JacobianSafety{},             JacobianSafetyProjection{}};
+}
+
+Jacobian jacobian(const Chain& chain, const JointVector& q) {
+  ChainState state;
+  update(chain, q, state);
+  return state.jacobian;
+}
+
+VectorXd singular_values(const MatrixXd& m) { return Eigen::JacobiSVD<MatrixXd>(m).singularValues(); }
+
+double ratio(const MatrixXd& m) {
+  const VectorXd s = singular_values(m);
+  return s[s.size() - 1] / s[0];
+}
+
+JointVector inside(Random& random, const Chain& chain, double margin = 0.05) {
+  JointVector q(chain.dof());
+  for (int i = 0; i < chain.dof(); ++i) {
+    const double lower = chain.limits().lower[i] + margin, upper = chain.limits().upper[i] - margin;
+    q[i] = random.uniform(std::max(lower, -2.5), std::min(upper, 2.5));
+  }
+  return q;
+}
+
+JointVector regular(Random& random, const Chain& chain, double least_ratio) {
+  for (;;) {
+    const JointVector q = inside(random, chain);
+    if (ratio(jacobian(chain, q)) >= least_ratio) return q;
+  }
+}
+
+// Which limits to hold.
+ServoOptions holding(bool position, bool velocity, bool acceleration, bool jerk) {
+  ServoOptions options;
+  options.position_limits = position;
+  options.velocity_limits = velocity;
+  options.acceleration_limits = acceleration;
+  options.jerk_limits = jerk;
+  options.soft_start = 0.0;
+  return options;
+}
+
+// The same arm, with an acceleration limit in each joint, and a jerk limit if asked for.
+Chain complete(const Chain& chain, double jerk = kInfinity) {
+  JointLimits limits = chain.limits();
+  limits.acceleration = limits.acceleration.cwiseMin(10.0);
+  limits.jerk.setConstant(jerk);
+  return chain.with_limits(limits);
+}
+
+// One cycle at q from rest.
+ServoStep once(const Chain& chain, const Method& method, const ServoOptions& options, const JointVector& q,
+               const Twist& twist) {
+  Servo servo(chain, method, options);
+  servo.reset(q);
+  return servo.update_twist(twist);
+}
+
+VectorXd rule(const Chain& chain, const Method& method, const JointVector& q, const Twist& twist) {
+  VelocitySolver solver(method);
+  return solver.solve(jacobian(chain, q), twist).qdot;
+}
+
+}  // namespace
+
+TEST_CASE("while no limit is met the answer is the rule's, to the last digit") {
+  long same = 0, other = 0;
+  for (const auto& [name, shipped] : arms()) {
+    const Chain chain = complete(shipped, 500.0);
+    for (const Method& method : some_methods()) {
+      for (const OnLimit on_limit : {OnLimit::Redistribute, OnLimit::Scale}) {
+        CAPTURE(name);
+        Random random(1);
+        ServoOptions options;
+        options.on_limit = on_limit;
+        options.exact = {true, true, true, false, false, false};
+        Servo servo(chain, method, options);
+        VelocitySolver solver(method);
+        servo.reset(regular(random, chain, 0.05));
+        const Twist twist = 0.1 * random.unit(6);
+        for (int cycle = 0; cycle < 400; ++cycle) {
+          const Twist now = twist * std::min(1.0, 2e-5 * cycle * cycle);
+          const VectorXd asked = solver.solve(jacobian(chain, servo.q()), now).qdot;
+          const ServoStep step = servo.update_twist(now);
+          if (step.limiting_joints != 0) {
+            ++other;
+            continue;
+          }
+          ++same;
+          CHECK(VectorXd(step.qdot) == asked);
+          CHECK(step.scale == 1.0);
+          CHECK(step.status <= Status::Damped);
+        }
+      }
+    }
+  }
+  CAPTURE(other);
+  CHECK(same > 40000);
+}
+
+TEST_CASE("redistribution: the bounded least squares that it says, by its optimality conditions") {
+  Random random(2);
+  int cases = 0, several = 0;
+  for (const auto& [name, shipped] : arms()) {
+    for (int repeat = 0; repeat < 60; ++repeat) {
+      CAPTURE(name);
+      CAPTURE(repeat);
+      const int n = shipped.dof();
+      const JointVector q = regular(random, shipped, 0.11);
+      const MatrixXd J = jacobian(shipped, q);
+      const Twist twist = 0.5 * random.unit(6);
+      const VectorXd asked = rule(shipped, JParse{}, q, twist);
+      JointLimits limits = shipped.limits();
+      for (int i = 0; i < n; ++i) {
+        limits.velocity[i] = random.chance(0.5) ? kInfinity : std::abs(asked[i]) * random.uniform(0.1, 1.5) + 1e-6;
+      }
+      if (((asked.cwiseAbs() - limits.velocity).array() <= 0.0).all()) continue;
+      const Chain chain = shipped.with_limits(limits);
+      const ServoStep step = once(chain, JParse{}, holding(false, true, false, false), q, twist);
+      const VectorXd qdot = step.qdot, x = qdot - asked;
+      ++cases;
+
+      // min |J x|² + λ² |x|², λ = σ_max/100, and once more from there: as the stacked problem that it is.
+      const Eigen::JacobiSVD<MatrixXd> svd(J);
+      const double largest = svd.singularValues()[0], lambda = 1e-2 * largest;
+      LeastSquaresProblem problem;
+      problem.A = (MatrixXd(6 + n, n) << J, lambda * MatrixXd::Identity(n, n)).finished();
+      problem.b = VectorXd::Zero(6 + n);
+      problem.lower = -limits.velocity - asked;
+      problem.upper = limits.velocity - asked;
+      LeastSquares oracle;
+      problem.b.tail(n) = lambda * oracle.solve(problem).x;
+      const LeastSquaresSolution best = oracle.solve(problem);
+      CHECK((x - best.x).norm() <= 1e-9 * (1.0 + x.norm()));
+      int held = 0;
+      for (int i = 0; i < n; ++i) {
+        CHECK(std::abs(qdot[i]) <= limits.velocity[i]);
+        const bool on = std::abs(qdot[i]) >= limits.velocity[i] * (1.0 - 1e-14);
+        held += on;
+        if ((step.limiting_joints >> i & 1) != 0) CHECK(on);
+      }
+      CHECK(step.limiting_joints != 0);
+      several += held > 1;
+
+      // So the tool is no farther off than with the rule's answer cut off.
+      const VectorXd cut = asked.cwiseMax(-limits.velocity).cwiseMin(limits.velocity);
+      CHECK((J * x).norm() <= (J * (cut - asked)).norm() + lambda * (cut - asked).norm());
+      CHECK((step.status == Status::Limited) == ((J * x).norm() > 1e-4 * (J * asked).norm()));
+    }
+  }
+  CHECK(cases > 300);
+  CHECK(several > 100);
+}
+
+TEST_CASE("redundant arms: the other joints take over all of it where they can") {
+  Random random(3);
+  int cases = 0, took_over = 0;
+  for (const auto& [name, shipped] : arms()) {
+    if (shipped.dof() != 7) continue;
+    for (int repeat = 0; repeat < 60; ++repeat) {
+      const JointVector q = regular(random, shipped, 0.1);
+      const MatrixXd J = jacobian(shipped, q);
+      const VectorXd null = Eigen::JacobiSVD<MatrixXd>(J, Eigen::ComputeFullV).matrixV().col(6);
+      const Twist twist = 0.3 * random.unit(6);
+      const JParse method{0.05};
+      const VectorXd asked = rule(shipped, method, q, twist);
+      for (int i = 0; i < 7; ++i) {
+        if (std::abs(null[i]) < 0.5) continue;
+        for (const bool blocked : {false, true}) {
+          CAPTURE(name);
+          CAPTURE(i);
+          CAPTURE(blocked);
+          JointLimits limits = shipped.limits();
+          limits.velocity.setConstant(kInfinity);
+          if (!blocked) {
+            limits.velocity[i] = 0.7 * std::abs(asked[i]);
+          } else if (shipped.joint_types()[static_cast<std::size_t>(i)] == JointType::Continuous) {
+            continue;
+          } else {
+            (asked[i] > 0.0 ? limits.upper : limits.lower)[i] = q[i];
+          }
+          const ServoStep step =
+              once(shipped.with_limits(limits), method, holding(blocked, true, false, false), q, twist);
+          ++cases;
+          const double missed = (step.achieved_twist - twist).norm() / twist.norm();
+          CHECK(missed <= 1e-3);
+          CHECK((step.status == Status::Ok) == (missed <= 1e-4));
+          took_over += missed <= 1e-4;
+          CHECK(step.limiting_joints == 1u << i);
+          if (blocked) CHECK(step.q[i] == q[i]);
+        }
+      }
+    }
+  }
+  CHECK(cases > 200);
+  CHECK(took_over > 0.95 * cases);
+}
+
+TEST_CASE("exact rows are kept while the others give way, in base and in tool axes") {
+  Random random(4);
+  int cases = 0, gave_way = 0, first_lost = 0;
+  for (const auto& [name, shipped] : arms()) {
+    const int n = shipped.dof();
+    for (int repeat = 0; repeat < 80; ++repeat) {
+      CAPTURE(name);
+      CAPTURE(repeat);
+      const JointVector q = regular(random, shipped, 0.11);
+      ChainState state;
+      update(shipped, q, state);
+      ServoOptions options = holding(false, true, false, false);
+      options.task.frame = repeat % 2 == 0 ? Frame::Base : Frame::Tool;
+      Task first{{true, true, true, false, false, false}, options.task.frame};
+      if (repeat % 3 == 2) first.mask = {false, false, true, true, true, false};  // height and tilt
+      options.exact = first.mask;
+      const Twist twist = 0.5 * random.unit(6);
+      const VectorXd asked = rule(shipped, JParse{}, q, twist);
+      const int i = random.integer(0, n - 1);
+      // Can the others do the first rows alone?
+      MatrixXd rest = select_rows(first, state.tip.linear(), state.jacobian);
+      rest.col(i).setZero();
+      if (ratio(rest) < 0.15) continue;
+      JointLimits limits = shipped.limits();
+      limits.velocity.setConstant(kInfinity);
+      limits.velocity[i] = 0.3 * std::abs(asked[i]);
+      const ServoStep step = once(shipped.with_limits(limits), JParse{}, options, q, twist);
+      const Twist missed = twist - step.achieved_twist;
+      ++cases;
+      // They weigh 10³ times as much, so what they miss is 10⁻⁶ of what the others do, times how hard they pull.
+      const double pull = (twist.norm() + missed.norm()) / ratio(rest);
+      CHECK(select_rows(first, state.tip.linear(), missed).norm() <= 1e-5 * pull);
+      if (missed.norm() > 1e-3 * twist.norm()) {
+        ++gave_way;
+        CHECK(step.status == Status::Limited);
+        // Without priority these rows would have lost something too.
+        options.exact.fill(false);
+        const ServoStep even = once(shipped.with_limits(limits), JParse{}, options, q, twist);
+        const Twist even_missed = twist - even.achieved_twist;
+        first_lost += select_rows(first, state.tip.linear(), even_missed).norm() > 1e-3 * twist.norm();
+      }
+    }
+  }
+  CHECK(cases > 250);
+  CHECK(gave_way > 100);
+  CHECK(first_lost > 50);
+}
+
+TEST_CASE("scaling keeps the direction, and gets there in proportion, whenever the limits allow") {
+  long straight = 0, bent = 0;
+  for (const auto& [name, shipped] : arms()) {
+    for (const bool accelerations : {false, true}) {
+      Random random(5);
+      CAPTURE(name);
+      CAPTURE(accelerations);
+      const Chain chain = complete(shipped, 200.0);
+      ServoOptions options = holding(true, true, accelerations, accelerations);
+      options.on_limit = OnLimit::Scale;
+      Servo servo(chain, JParse{}, options);
+      VelocitySolver solver(JParse{});
+      LimitTracker tracker(chain.limits(), {.acceleration = accelerations, .jerk = accelerations});
+      const JointVector start = inside(random, chain);
+      servo.reset(start);
+      tracker.reset(start);
+      Twist twist = 0.5 * random.unit(6);
+      // The largest s in [0, 1] for which from + s way is inside; below 0 if there is none.
+      const auto largest = [](const VectorXd& from, const VectorXd& way, const VelocityBounds& bounds) {
+        double low = 0.0, high = 1.0;
+        for (Eigen::Index i = 0; i < way.size(); ++i) {
+          if (way[i] == 0.0) continue;
+          const double a = (bounds.lower[i] - from[i]) / way[i], b = (bounds.upper[i] - from[i]) / way[i];
+          low = std::max(low, std::min(a, b));
+          high = std::min(high, std::max(a, b));
+        }
+        return low <= high ? high : -1.0;
+      };
+      for (int cycle = 0; cycle < 1500; ++cycle) {
+        if (random.chance(0.01)) twist = random.decades(-2.0, 0.5) * random.unit(6);
+        const VectorXd asked = solver.solve(jacobian(chain, servo.q()), twist).qdot;
+        const VectorXd last = tracker.qdot(), zero = VectorXd::Zero(chain.dof());
+        const double speed = largest(zero, asked, tracker.heading());
+        const VectorXd goal = std::max(0.0, speed) * asked;
+        VectorXd way = goal - last;
+        for (double& x : way) x = std::abs(x) > 1e-12 ? x : 0.0;  // of rounding
+        const double part = largest(last, way, tracker.bounds());
+        const ServoStep step = servo.update_twist(twist);
+        JointVector qdot = step.qdot;
+        tracker.advance(qdot);
+        REQUIRE(qdot == step.qdot);
+        if (speed >= 0.0 && part >= 0.0) {
+          ++straight;
+          CHECK((step.qdot - last - part * way).norm() <= 1e-9 * (asked.norm() + last.norm()));
+          if (!accelerations) CHECK((step.qdot - speed * asked).norm() <= 1e-9 * asked.norm());
+        } else {
+          ++bent;
+          CHECK(step.status == Status::Limited);
+        }
+      }
+    }
+  }
+  CHECK(straight > 20000);
+  CAPTURE(bent);
+}
+
+TEST_CASE("without acceleration limits the answer does not depend on the cycles before it") {
+  int limited = 0;
+  for (const auto& [name, shipped] : arms()) {
+    for (const OnLimit on_limit : {OnLimit::Redistribute, OnLimit::Scale}) {
+      Random random(12);
+      CAPTURE(name);
+      JointLimits limits = shipped.limits();
+      limits.velocity *= 0.3;
+      const Chain chain = shipped.with_limits(limits);
+      ServoOptions options = holding(true, true, false, false);
+      options.on_limit = on_limit;
+      Servo servo(chain, JParse{}, options);
+      servo.reset(regular(random, chain, 0.05));
+      const Twist from = random.unit(6), to = random.unit(6);
+      for (int cycle = 0; cycle < 600; ++cycle) {
+        const Twist twist = from + 0.002 * cycle * (to - from);
+        const ServoStep fresh = once(chain, JParse{}, options, servo.q(), twist);
+        const ServoStep step = servo.update_twist(twist);
+        limited += step.status == Status::Limited;
+        CHECK((step.qdot - fresh.qdot).norm() <= 1e-4 * fresh.qdot.norm());
+      }
+    }
+  }
+  CHECK(limited > 3000);
+}
+
+TEST_CASE("leaving a limit is never held back, from any corner of the limits") {
+  int whole = 0, corners = 0;
+  for (const auto& [name, shipped] : arms()) {
+    Random random(6);
+    const Chain chain = complete(shipped);
+    const int n = chain.dof();
+    const JointLimits& limits = chain.limits();
+    for (int corner = 0; corner < 1 << n; ++corner) {
+      JointVector q(n), inward(n);
+      bool new_one = true;
+      for (int i = 0; i < n; ++i) {
+        const bool up = (corner >> i & 1) != 0;
+        if (std::isinf(limits.upper[i])) {
+          new_one = new_one && !up;
+          q[i] = random.uniform(-2.0, 2.0);
+          inward[i] = 0.0;
+        } else {
+          q[i] = up ? limits.upper[i] : limits.lower[i];
+          inward[i] = (up ? -1.0 : 1.0) * random.uniform(0.02, 0.2);
+        }
+      }
+      if (!new_one) continue;
+      CAPTURE(name);
+      CAPTURE(corner);
+      ++corners;
+      const Jacobian J = jacobian(chain, q);
+      const Twist twist = J * inward;
+      const ServoStep step = once(chain, JParse{}, holding(true, true, false, false), q, twist);
+      const Twist asked = J * rule(chain, JParse{}, q, twist);
+      CHECK(step.qdot.norm() > 1e-6);
+      CHECK(step.achieved_twist.dot(asked) > 0.0);
+      if (ratio(J) > 0.1) {  // what leads inside is among all that can be chosen
+        ++whole;
+        CHECK((step.achieved_twist - twist).norm() <= 1e-3 * twist.norm());
+      }
+      // With all limits, and for two hundred cycles.
+      for (const OnLimit on_limit : {OnLimit::Redistribute, OnLimit::Scale}) {
+        if (on_limit == OnLimit::Scale && (n != 6 || ratio(J) < 0.1)) continue;  // their rule itself leads inside
+        ServoOptions options = holding(true, true, true, true);
+        options.on_limit = on_limit;
+        Servo servo(chain, JParse{}, options);
+        servo.reset(q);
+        for (int cycle = 0; cycle < 200; ++cycle) servo.update_twist(Twist(jacobian(chain, servo.q()) * inward));
+        CHECK((servo.q() - q).norm() > 1e-5);
+      }
+    }
+  }
+  CHECK(corners > 400);
+  CHECK(whole > 30);
+}
+
+TEST_CASE("starts outside the limits, and too fast ones: every arm comes back, and stays") {
+  for (const auto& [name, shipped] : arms()) {
+    for (const double jerk : {kInfinity, 300.0}) {
+      for (int kind = 0; kind < 6; ++kind) {
+        Random random(7);
+        CAPTURE(name);
+        CAPTURE(jerk);
+        CAPTURE(kind);
+        const Chain chain = complete(shipped, jerk);
+        const JointLimits& limits = chain.limits();
+        const int n = chain.dof();
+        JointVector start = inside(random, chain), moving = JointVector::Zero(n);
+        for (int i = 0; i < n; ++i) {
+          if (kind < 2 && !std::isinf(limits.upper[i])) {
+            start[i] = kind == 0 ? limits.upper[i] + 0.04 : limits.lower[i] - 0.04;
+          }
+          if (kind >= 2 && kind < 4) moving[i] = (kind == 2 ? 2.0 : -2.0) * limits.velocity[i];
+        }
+        if (kind == 4) start.setZero();  // outside for some
+        if (kind == 5 && !std::isinf(limits.upper[1])) start[1] = limits.upper[1] + 0.5;
+        ServoOptions options;
+        if (random.chance(0.5)) options.on_limit = OnLimit::Scale;
+        Servo servo(chain, JParse{}, options);
+        servo.reset(start, moving);
+        const Pose target = pose(chain, inside(random, chain));
+        JointVector last = moving, last_change = JointVector::Zero(n);
+        const double dt = options.dt;
+        long broken = 0, late = 0, grew = 0;
+        // There at a tenth of the speed, after the overshoot of the fast ones.
+        double time = 0.0;
+        for (int i = 0; i < n; ++i) {
+          const double v = std::abs(moving[i]), a = limits.acceleration[i];
+          const double over = std::max({0.0, start[i] - limits.upper[i], limits.lower[i] - start[i]}) + v * v / a +
+                              (std::isinf(jerk) ? 0.0 : v * a / jerk);
+          time = std::max(time, 1.2 * over / (0.1 * limits.velocity[i]) + 4.0 * v / a);
+        }
+        const int allowed = static_cast<int>(time / dt) + 1000;
+        for (int cycle = 0; cycle < allowed + 300; ++cycle) {
+          const ServoStep step = servo.update(target);
+          const JointVector change = step.qdot - last;
+          for (int i = 0; i < n; ++i) {
+            broken += std::abs(change[i]) > limits.acceleration[i] * dt * (1.0 + 1e-9);
+            broken += std::abs(change[i] - last_change[i]) > jerk * dt * dt * (1.0 + 1e-9) + 1e-14;
+            late += cycle >= allowed && (step.q[i] > limits.upper[i] || step.q[i] < limits.lower[i] ||
+                                         std::abs(step.qdot[i]) > limits.velocity[i] * (1.0 + 1e-9));
+            grew += std::abs(step.qdot[i]) > std::max(std::abs(last[i]), limits.velocity[i]) * (1.0 + 1e-9);
+          }
+          last = step.qdot;
+          last_change = change;
+        }
+        CHECK(broken == 0);
+        CHECK(late == 0);
+        CHECK(grew == 0);
+      }
+    }
+  }
+}
+
+TEST_CASE("a start at all zeros: each of twelve directions moves, or says why not") {
+  int moved = 0, said = 0;
+  for (const auto& [name, shipped] : arms()) {
+    const Chain chain = complete(shipped);
+    for (const OnLimit on_limit : {OnLimit::Redistribute, OnLimit::Scale}) {
+      for (int direction = 0; direction < 12; ++direction) {
+        CAPTURE(name);
+        CAPTURE(direction);
+        ServoOptions options;
+        options.on_limit = on_limit;
+        Servo servo(chain, JParse{}, options);
+        servo.reset(JointVector::Zero(chain.dof()));
+        Twist unit = Twist::Zero();
+        unit[direction % 6] = direction < 6 ? 1.0 : -1.0;
+        double progress = 0.0;
+        int fine = 0;
+        for (int cycle = 0; cycle < 300; ++cycle) {
+          const ServoStep step = servo.update_twist(0.05 * unit);
+          progress += options.dt * unit.dot(step.achieved_twist);
+          fine += step.status == Status::Ok;
+          REQUIRE(step.status <= Status::Limited);
+          // Ok means done.
+          if (step.status == Status::Ok) CHECK((step.achieved_twist - 0.05 * unit).norm() < 1e-6);
+        }
+        const bool through = progress > 0.5 * 300 * options.dt * 0.05;
+        CHECK((through || fine < 300));
+        (through ? moved : said)++;
+      }
+    }
+  }
+  MESSAGE("from all zeros: ", moved, " directions done, ", said, " damped or limited");
+  CHECK(moved > 60);
+}
+
+TEST_CASE("bad input in motion: a stop as fast as the limits allow, and on again afterwards") {
+  for (const auto& [name, shipped] : arms()) {
+    for (const double jerk : {kInfinity, 100.0}) {
+      for (const bool as_pose : {false, true}) {
+        Random random(9);
+        CAPTURE(name);
+        CAPTURE(jerk);
+        const Chain chain = complete(shipped, jerk);
+        const JointLimits& limits = chain.limits();
+        Servo servo(chain, JParse{});
+        servo.reset(regular(random, chain, 0.08));
+        const Pose target = pose(chain, regular(random, chain, 0.08));
+        for (int cycle = 0; cycle < 150; ++cycle) servo.update(target);
+        REQUIRE(servo.qdot().norm() > 1e-2);
+
+        JointVector last = servo.qdot(), last_change;
+        int cycle = 0;
+        for (; cycle < 3000; ++cycle) {
+          Pose wrong = target;
+          wrong.matrix()(random.integer(0, 2), random.integer(0, 3)) = random.chance(0.5) ? kNan : kInfinity;
+          Twist twist = Twist::Zero();
+          twist[random.integer(0, 5)] = random.chance(0.5) ? kNan : -kInfinity;
+          const JointVector q = servo.q();
+          const ServoStep step = as_pose ? servo.update(wrong) : servo.update_twist(twist);
+          CHECK(step.status == Status::BadInput);
+          CHECK(step.scale == 0.0);
+          CHECK((step.achieved_twist - jacobian(chain, q) * step.qdot).norm() < 1e-12);
+          const JointVector change = step.qdot - last;
+          for (int i = 0; i < chain.dof(); ++i) {
+            const double most = limits.acceleration[i] * 1e-3 * (1.0 + 1e-9);
+            CHECK(std::abs(change[i]) <= most);
+            if (cycle > 0) CHECK(std::abs(change[i] - last_change[i]) <= jerk * 1e-6 * (1.0 + 1e-9) + 1e-14);
+            if (std::isinf(jerk)) {  // straight down
+              const double want = std::max(0.0, std::abs(last[i]) - limits.acceleration[i] * 1e-3);
+              CHECK(std::abs(step.qdot[i]) == doctest::Approx(want).epsilon(1e-9).scale(1e-9));
+            }
+          }
+          last = step.qdot;
+          last_change = change;
+          if (last.isZero(0.0) && change.isZero(0.0)) break;
+        }
+        CHECK(cycle < 3000);
+        const JointVector rest = servo.q();
+        CHECK(servo.update_twist(Twist::Constant(kNan)).q == rest);
+
+        ServoStep step = servo.update(target);
+        CHECK(step.status != Status::BadInput);
+        for (int k = 0; k < 3000; ++k) step = servo.update(target);
+        CHECK(step.status != Status::BadInput);
+        CHECK((servo.q() - rest).norm() > 1e-3);
+      }
+    }
+  }
+}
+
+TEST_CASE("no jumps where the joints held change: as commands move, and as the arm does") {
+  // Halves the interval again and again, keeping the half that changes more: a jump stays, a slope vanishes.
+  const auto closest = [](const std::function<VectorXd(double)>& f, double a, double b) {
+    VectorXd fa = f(a), fb = f(b);
+    for (int k = 0; k < 26; ++k) {
+      const double middle = 0.5 * (a + b);
+      const VectorXd fm = f(middle);
+      if ((fm - fa).norm() > (fb - fm).norm()) {
+        b = middle;
+        fb = fm;
+      } else {
+        a = middle;
+        fa = fm;
+      }
+    }
+    return (fb - fa).norm();
+  };
+  constexpr int kSteps = 300;
+  double by_command = 0.0, over_rule = 0.0, by_state = 0.0, tool_by_state = 0.0, jump = 0.0;
+  long switches = 0, steps = 0, swings = 0;
+  for (const auto& [name, shipped] : arms()) {
+    Random random(10);
+    for (int repeat = 0; repeat < 40; ++repeat) {
+      CAPTURE(name);
+      CAPTURE(repeat);
+      JointLimits limits = shipped.limits();
+      for (double& v : limits.velocity) v = random.decades(-1.5, 0.5);
+      const Chain chain = shipped.with_limits(limits);
+      ServoOptions options = holding(false, true, false, false);
+      if (repeat % 5 == 4) options.exact = {true, true, true, false, false, false};
+      if (repeat % 4 == 2) options.on_limit = OnLimit::Scale;
+      const bool even = repeat % 5 != 4 && repeat % 4 != 2;
+      const JointVector q = inside(random, chain), way = 0.5 * random.unit(chain.dof());
+      const Twist from = random.unit(6), to = random.unit(6);
+      const double sigma = singular_values(jacobian(chain, q))[0];
+      const auto command = [&](double t) -> Twist { return from + t * (to - from); };
+      const auto at_command = [&](double t) -> VectorXd { return once(chain, JParse{}, options, q, command(t)).qdot; };
+      VectorXd last = at_command(0.0), last_rule = rule(chain, JParse{}, q, from), last_state = last;
+      std::uint16_t joints = 0;
+      double worst = 0.0, last_missed = 0.0;
+      bool was_regular = false;
+      int where = 0;
+      for (int k = 1; k <= kSteps; ++k) {
+        const double t = static_cast<double>(k) / kSteps;
+        const ServoStep step = once(chain, JParse{}, options, q, command(t));
+        const VectorXd now = step.qdot, now_rule = rule(chain, JParse{}, q, command(t));
+        switches += step.limiting_joints != joints;
+        joints = step.limiting_joints;
+        const double change = (now - last).norm();
+        by_command = std::max(by_command, change * sigma * kSteps / (to - from).norm());
+        over_rule = std::max(over_rule, change / ((now_rule - last_rule).norm() + 1e-6));
+        if (change > worst) {
+          worst = change;
+          where = k;
+        }
+        last = now;
+        last_rule = now_rule;
+
+        const JointVector there = q + t * way;
+        const MatrixXd J = jacobian(chain, there);
+        const VectorXd now_state = once(chain, JParse{}, options, there, from).qdot;
+        const bool is_regular = ratio(J) > 0.1;
+        const double missed = (from - J * now_state).norm();
+        if (even && is_regular && was_regular) {
+          tool_by_state = std::max(tool_by_state, std::abs(missed - last_missed) * kSteps / way.norm());
+        }
+        last_missed = missed;
+        was_regular = is_regular;
+        by_state = std::max(by_state, (now_state - last_state).norm() * kSteps / way.norm());
+        ++steps;
+        swings += ((now_state - last_state).array().abs() > 0.2 * limits.velocity.array()).any();
+        last_state = now_state;
+      }
+      if (where > 0) {
+        const double end = static_cast<double>(where) / kSteps;
+        const double left = closest(at_command, end - 1.0 / kSteps, end);
+        CHECK(left < 1e-5);
+        jump = std::max(jump, left);
+      }
+    }
+  }
+  MESSAGE("command: |Δq̇| σ_max / |Δtwist| ≤ ", by_command, ", |Δq̇| / |Δq̇ of the rule| ≤ ", over_rule,
+          ", left of the largest change over 1e-8 of its step ", jump, ", ", switches, " switches");
+  MESSAGE("state, steps of 1.7 mrad: |Δq̇| / |Δq| ≤ ", by_state, " 1/s, the tool's error ≤ ", tool_by_state,
+          " 1/s; a fifth of a joint's speed in ", swings, " of ", steps, " steps");
+  CHECK(switches > 1000);
+  CHECK(over_rule < 1e4);  // what the weight of joint motion against twist, 1e-4, allows
+  CHECK(by_command < 1e4);
+  // As the arm moves joints may swing from limit to limit where those left free are singular among themselves; what the
+  // tool misses does not.
+  CHECK(tool_by_state < 100.0);
+  CHECK(100 * swings < steps);
+}
+
+#ifdef SIGMAIK_TEST_HEAP
+TEST_CASE("no heap with limits active, in the servo and in constrained inverse kinematics") {
+  Random random(11);
+  for (const auto& [name, shipped] : arms()) {
+    const Chain chain = complete(shipped, 1000.0);
+    for (const OnLimit on_limit : {OnLimit::Redistribute, OnLimit::Scale}) {
+      for (const Frame frame : {Frame::Base, Frame::Tool}) {
+        CAPTURE(name);
+        ServoOptions options;
+        options.on_limit = on_limit;
+        options.task.frame = frame;
+        if (random.chance(0.5)) options.exact = {true, true, true, false, false, false};
+        Servo servo(chain, JParse{}, options);
+        servo.reset(inside(random, chain), random.vector(chain.dof()));
+        Pose target = pose(chain, inside(random, chain)), wrong = target;
+        target.translation() *= 3.0;
+        wrong.matrix()(0, 0) = kNan;
+        int limited = 0;
+        const test::HeapWatch watch;
+        for (int cycle = 0; cycle < 300; ++cycle) {
+          limited += servo.update(target).status == Status::Limited;
+          limited += servo.update_twist(Twist::Constant(cycle % 100 < 50 ? 1.0 : -1.0)).status == Status::Limited;
+          if (cycle % 50 == 49) servo.update(wrong);
+        }
+        CHECK(watch.calls() == 0);
+        CHECK(limited > 100);
+      }
+    }
+    for (const bool scaled : {false, true}) {
+      const bool torque = name == "franka_panda";
+      ConstrainedIkOptions options;
+      options.torque_limits = torque;
+      if (scaled) options.gamma = 1.0;
+      if (scaled) options.max_error.setConstant(0.01);
+      ConstrainedIk ik(chain, options);
+      ik.reset(inside(random, chain), random.vector(chain.dof()));
+      const Pose target = pose(chain, inside(random, chain));
+      Pose far = target, wrong = target;
+      far.translation() *= 3.0;
+      wrong.matrix()(0, 0) = kNan;
+      int limited = 0;
+      const test::HeapWatch watch;
+      for (int cycle = 0; cycle < 300; ++cycle) {
+        limited += ik.step(cycle % 100 < 50 ? target : far).status == Status::Limited;
+        if (cycle % 50 == 49) ik.step(wrong);
+      }
+      CHECK(watch.calls() == 0);
+      CHECK(limited > 50);
+    }
+  }
+}
+#endif
