@@ -292,70 +292,82 @@ void Servo::limit(ServoStep& step) noexcept {
 }
 
 JointVector Servo::redistribute(const JointVector& qdot, const VelocityBounds& bounds, ServoStep& step) noexcept {
-  // For q̇ + x, from x = 0 on, and slack s that stands for the twist still missed: min |x|² + |s|², M x + λ s = missed, which
-  // is min |M x − missed|² + λ² |x|² in one level, without squaring M.
-  const int n = chain_.dof();
   const Spectrum& spectrum = solver_.spectrum();
-  const int m = spectrum.size();
   const double largest = spectrum.sigma(0), regular = threshold(solver_.method());
-  const bool ranked = options_.exact != std::array<bool, 6>{};
-  const int rows = ranked ? spectrum.rows() : m;
-
-  auto& C = problem_.C;
-  C.setZero(rows, n + rows);
-  problem_.d.setZero(rows);
-  if (!ranked) {
-    for (int i = 0; i < m; ++i) C.row(i).head(n) = weight(spectrum.sigma(i), largest, regular) * spectrum.v(i).transpose();
-  } else {
-    for (int i = 0; i < m; ++i) {
-      const double w = weight(spectrum.sigma(i), largest, regular);
-      for (int k = 0; k < rows; ++k) C.row(k).head(n) += w * spectrum.u(i)[k] * spectrum.v(i).transpose();
+  rows_.setZero(spectrum.size(), chain_.dof());
+  if (options_.exact == std::array<bool, 6>{}) {
+    for (int i = 0; i < spectrum.size(); ++i) {
+      rows_.row(i) = weight(spectrum.sigma(i), largest, regular) * spectrum.v(i).transpose();
     }
-    // The rows that come first have singularities of their own.
-    TaskJacobian first = select_rows(exact_, state_.tip.linear(), state_.jacobian);
-    int at = 0;
-    for (std::size_t i = 0; i < 6; ++i) {
-      if (!options_.exact[i]) continue;
-      if (i >= 3) first.row(at) *= options_.length_scale;
-      ++at;
-    }
-    exact_spectrum_.decompose(first);
-    first.setZero();
-    for (int i = 0; i < exact_spectrum_.size(); ++i) {
-      const double w = weight(exact_spectrum_.sigma(i), exact_spectrum_.sigma(0), regular);
-      first += w * exact_spectrum_.u(i) * exact_spectrum_.v(i).transpose();
-    }
-    int row = 0;
-    at = 0;
-    for (std::size_t i = 0; i < 6; ++i) {
-      if (options_.exact[i]) C.row(row).head(n) = kExactWeight * first.row(at++);
-      if (options_.task.mask[i]) ++row;
-    }
+    return nearest(qdot, rows_, rows_.lazyProduct(qdot), largest, qdot, bounds, step);
   }
-  for (int k = 0; k < rows; ++k) C(k, n + k) = kJointWeight * largest;
 
-  problem_.lower.setConstant(n + rows, -std::numeric_limits<double>::infinity());
-  problem_.upper.setConstant(n + rows, std::numeric_limits<double>::infinity());
+  // First what comes first, by itself: it has singularities of its own.
+  TaskJacobian first = select_rows(exact_, state_.tip.linear(), state_.jacobian);
+  int at = 0;
+  for (std::size_t i = 0; i < 6; ++i) {
+    if (!options_.exact[i]) continue;
+    if (i >= 3) first.row(at) *= options_.length_scale;
+    ++at;
+  }
+  exact_spectrum_.decompose(first);
+  first.setZero();
+  for (int i = 0; i < exact_spectrum_.size(); ++i) {
+    const double w = weight(exact_spectrum_.sigma(i), exact_spectrum_.sigma(0), regular);
+    first += w * exact_spectrum_.u(i) * exact_spectrum_.v(i).transpose();
+  }
+  const JointVector begin =
+      nearest(qdot, first, first.lazyProduct(qdot), exact_spectrum_.sigma(0), qdot, bounds, step);
+
+  // Then all the rest, while that stays.
+  rows_.setZero(spectrum.rows(), chain_.dof());
+  for (int i = 0; i < spectrum.size(); ++i) {
+    rows_ += weight(spectrum.sigma(i), largest, regular) * spectrum.u(i) * spectrum.v(i).transpose();
+  }
+  TaskVector goal = rows_.lazyProduct(qdot);
+  int row = 0;
+  at = 0;
+  for (std::size_t i = 0; i < 6; ++i) {
+    if (options_.exact[i]) {
+      rows_.row(row) = kExactWeight * first.row(at++);
+      goal[row] = rows_.row(row).dot(begin);
+    }
+    if (options_.task.mask[i]) ++row;
+  }
+  return nearest(begin, rows_, goal, largest, qdot, bounds, step);
+}
+
+// Inside the bounds, min |rows q̇ − goal|² + λ² |q̇ − begin|², and again from there.
+JointVector Servo::nearest(const JointVector& begin, const TaskJacobian& rows, const TaskVector& goal, double largest,
+                           const JointVector& asked, const VelocityBounds& bounds, ServoStep& step) noexcept {
+  // For q̇ + x, and slack s that stands for the twist still missed: min |x|² + |s|², M x + λ s = missed, in one level, and
+  // without squaring M.
+  const auto m = rows.rows(), n = rows.cols();
+  problem_.C.setZero(m, n + m);
+  problem_.C.leftCols(n) = rows;
+  problem_.C.rightCols(m).diagonal().setConstant(kJointWeight * largest);
+  problem_.lower.setConstant(n + m, -std::numeric_limits<double>::infinity());
+  problem_.upper.setConstant(n + m, std::numeric_limits<double>::infinity());
   std::uint32_t held = 0;
-  JointVector x = qdot;
+  JointVector qdot = begin;
   for (int pass = 0; pass < kPasses; ++pass) {
-    problem_.lower.head(n) = bounds.lower - x;
-    problem_.upper.head(n) = bounds.upper - x;
-    for (int k = 0; k < rows; ++k) problem_.d[k] = C.row(k).head(n).dot(qdot - x);
+    problem_.lower.head(n) = bounds.lower - qdot;
+    problem_.upper.head(n) = bounds.upper - qdot;
+    problem_.d = goal - rows.lazyProduct(qdot);
     const LeastSquaresSolution solution = least_squares_.solve(problem_);
     if (solution.status == LeastSquaresStatus::BadInput) {  // numbers too far apart
-      return qdot.cwiseMax(bounds.lower).cwiseMin(bounds.upper);
+      return begin.cwiseMax(bounds.lower).cwiseMin(bounds.upper);
     }
     // One ulp beyond a bound that the last command is on, and there would be no way from there.
-    x = (x + solution.x.head(n)).cwiseMax(bounds.lower).cwiseMin(bounds.upper);
+    qdot = (qdot + solution.x.head(n)).cwiseMax(bounds.lower).cwiseMin(bounds.upper);
     held |= solution.at_lower | solution.at_upper;
   }
   for (int i = 0; i < n; ++i) {
-    const bool on = x[i] == bounds.lower[i] || x[i] == bounds.upper[i];
-    const bool free = bounds.lower[i] < bounds.upper[i] || qdot[i] != bounds.lower[i];
+    const bool on = qdot[i] == bounds.lower[i] || qdot[i] == bounds.upper[i];
+    const bool free = bounds.lower[i] < bounds.upper[i] || asked[i] != bounds.lower[i];
     if ((held >> i & 1u) != 0 && on && free) step.limiting_joints |= static_cast<std::uint16_t>(1u << i);
   }
-  return x;
+  return qdot;
 }
 
 }  // namespace sigmaik

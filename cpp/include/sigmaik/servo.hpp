@@ -113,6 +113,8 @@ class Servo {
   JointVector posture_velocity() const noexcept;
   void limit(ServoStep& step) noexcept;
   JointVector redistribute(const JointVector& qdot, const VelocityBounds& bounds, ServoStep& step) noexcept;
+  JointVector nearest(const JointVector& begin, const TaskJacobian& rows, const TaskVector& goal, double largest,
+                      const JointVector& asked, const VelocityBounds& bounds, ServoStep& step) noexcept;
   void take(ServoStep& step, bool achieved) noexcept;
 
   Chain chain_;
@@ -122,6 +124,7 @@ class Servo {
   LimitTracker tracker_;
   LeastSquares least_squares_;
   LeastSquaresProblem problem_;
+  TaskJacobian rows_;
   Spectrum exact_spectrum_;
   ChainState state_;
   JointVector nominal_, qdot_start_;
