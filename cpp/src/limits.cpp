@@ -6,6 +6,7 @@
 #include <limits>
 #include <utility>
 
+#include "finite.hpp"
 #include "message.hpp"
 
 namespace sigmaik {
@@ -282,24 +283,35 @@ void LimitTracker::reset(const JointRef& q, const JointRef& qdot) {
   update();
 }
 
-void LimitTracker::advance(JointVector& qdot) noexcept {
-  if (q_.size() == 0) return;
-  if (qdot.size() != n_) qdot = stop_;
-  for (int i = 0; i < n_; ++i) {
-    if (std::isnan(qdot[i])) qdot[i] = stop_[i];
+bool LimitTracker::advance(JointVector& qdot) noexcept {
+  if (q_.size() == 0) return false;
+  bool changed = false;
+  if (qdot.size() != n_) {
+    qdot = stop_;
+    changed = true;
   }
-  n_ <= 8 ? move<8>(qdot) : move<kMaxJoints>(qdot);
-  qdot = v_;
+  if (!detail::finite(qdot)) {
+    for (int i = 0; i < n_; ++i) {
+      if (std::isnan(qdot[i])) qdot[i] = stop_[i];
+    }
+    changed = true;
+  }
+  changed = (n_ <= 8 ? move<8>(qdot) : move<kMaxJoints>(qdot)) || changed;
   update();
+  return changed;
 }
 
 template <int kPadded>
-void LimitTracker::move(const JointVector& qdot) noexcept {
+bool LimitTracker::move(JointVector& qdot) noexcept {
   using Block = Eigen::Array<double, kPadded, 1>;
-  Block v = Block::Zero();
-  v.head(n_) = qdot.array();
+  Block asked = Block::Zero();
+  for (int i = 0; i < n_; ++i) asked[i] = qdot[i];
   Eigen::Map<Block> q(q_.data()), last(v_.data());
-  v = v.max(Eigen::Map<const Block>(bounds_.lower.data())).min(Eigen::Map<const Block>(bounds_.upper.data()));
+  const Block v = asked.max(Eigen::Map<const Block>(bounds_.lower.data())).min(Eigen::Map<const Block>(bounds_.upper.data()));
+  const bool changed = (v != asked).any();
+  if (changed) {
+    for (int i = 0; i < n_; ++i) qdot[i] = v[i];
+  }
   if (has_jerk_) {
     for (int i = 0; i < n_; ++i) {
       Joint& joint = joints_[static_cast<std::size_t>(i)];
@@ -319,6 +331,7 @@ void LimitTracker::move(const JointVector& qdot) noexcept {
       if (q[i] < joint.lower && q[i] >= joint.lower - rounding) q[i] = joint.lower;
     }
   }
+  return changed;
 }
 
 // Bounds of velocity and acceleration for all joints at once. Bit i of the answer: there is more to joint i.

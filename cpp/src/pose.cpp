@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "finite.hpp"
 #include "length.hpp"
 
 namespace sigmaik {
@@ -41,7 +42,7 @@ Twist pose_error(const Pose& current, const Pose& target) noexcept {
 }
 
 bool is_pose(const Eigen::Matrix4d& matrix) noexcept {
-  if (!matrix.allFinite()) return false;
+  if (!detail::finite(matrix)) return false;
   if (matrix.row(3) != Eigen::RowVector4d(0.0, 0.0, 0.0, 1.0)) return false;
   const Eigen::Matrix3d r = matrix.topLeftCorner<3, 3>();
   return (r.transpose() * r - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() <= 1e-6 && r.determinant() > 0.0;

@@ -8,6 +8,7 @@
 
 #include <sigmaik/pose.hpp>
 
+#include "finite.hpp"
 #include "length.hpp"
 #include "message.hpp"
 
@@ -197,7 +198,7 @@ ServoStep Servo::update(const Pose& target) noexcept {
 }
 
 ServoStep Servo::update_twist(const Twist& twist) noexcept {
-  if (!twist.allFinite()) return stop(Status::BadInput);
+  if (!detail::finite(twist)) return stop(Status::BadInput);
   return resolve(twist, qdot_start_.size() != 0 && !qdot_start_.isZero(0.0));
 }
 
@@ -228,7 +229,7 @@ ServoStep Servo::resolve(const Twist& twist, bool fade) noexcept {
     rule = false;
   }
   // Twists beyond all measure, where no velocity limit is held.
-  if (!(tracker_.q() + options_.dt * step.qdot).allFinite() || !step.achieved_twist.allFinite()) {
+  if (!detail::finite(tracker_.q() + options_.dt * step.qdot) || !detail::finite(step.achieved_twist)) {
     return stop(Status::BadInput);
   }
   take(step, rule);
@@ -241,10 +242,9 @@ void Servo::take(ServoStep& step, bool achieved) noexcept {
     step.q = step.qdot = JointVector::Zero(chain_.dof());
     return;
   }
-  const JointVector asked = step.qdot;
-  tracker_.advance(step.qdot);
+  const bool changed = tracker_.advance(step.qdot);
   step.q = tracker_.q();
-  if (!achieved || step.qdot != asked) {
+  if (!achieved || changed) {
     step.achieved_twist.setZero();
     for (int i = 0; i < chain_.dof(); ++i) step.achieved_twist += step.qdot[i] * state_.jacobian.col(i);
   }

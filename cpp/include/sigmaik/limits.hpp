@@ -89,7 +89,8 @@ class LimitTracker {
 
   /// One cycle with q̇ (n,). Entries outside the bounds are moved to the nearest; NaN, or a wrong size, becomes stop().
   /// Real time.
-  void advance(JointVector& qdot) noexcept;
+  /// \return whether an entry was moved
+  bool advance(JointVector& qdot) noexcept;
 
   /// (n,) [rad or m]: the sum of all cycles. Within rounding of a position limit it is on the limit, never beyond.
   const JointVector& q() const noexcept { return q_; }
@@ -121,7 +122,7 @@ class LimitTracker {
   };
 
   template <int kPadded>
-  void move(const JointVector& qdot) noexcept;
+  bool move(JointVector& qdot) noexcept;
   template <int kPadded>
   unsigned survey() noexcept;
   void update() noexcept;
