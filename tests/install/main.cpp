@@ -19,5 +19,6 @@ int main(int argc, char** argv) {
   }
   const Eigen::Vector3d moved = servo.tip().translation() - start;
   std::printf("%d joints, tip went %.4f m in 1 s\n", arm.dof(), moved.x());
-  return (moved - Eigen::Vector3d(0.05, 0, 0)).norm() < 1e-4 ? 0 : 1;
+  // Speeding up within the joints' acceleration limits takes a little of the way.
+  return moved.x() > 0.049 && (moved - Eigen::Vector3d(0.05, 0, 0)).norm() < 5e-4 ? 0 : 1;
 }
