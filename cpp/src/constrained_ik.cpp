@@ -7,6 +7,7 @@
 #include <sigmaik/pose.hpp>
 
 #include "length.hpp"
+#include "limit_options.hpp"
 #include "message.hpp"
 
 namespace sigmaik {
@@ -17,17 +18,6 @@ using detail::require;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kMet = 1e-9;  // [m, rad] an error this small is none
 constexpr double kAgree = 0.01;  // of the width of a joint's bounds: velocities this close are the same
-
-LimitOptions limit_options(const ConstrainedIkOptions& options) {
-  LimitOptions out;
-  out.dt = options.dt;
-  out.position = options.position_limits;
-  out.velocity = options.velocity_limits;
-  out.acceleration = options.acceleration_limits;
-  out.jerk = options.jerk_limits;
-  out.recovery_speed = options.recovery_speed;
-  return out;
-}
 
 // The rows of the task that are in `part`, or that are not.
 Task part(const ConstrainedIkOptions& options, bool exact) {
@@ -66,7 +56,7 @@ ConstrainedIk::ConstrainedIk(Chain chain, const ConstrainedIkOptions& options)
       options_(options),
       approximate_(part(options, false)),
       exact_(part(options, true)),
-      tracker_(chain_.limits(), limit_options(options)) {
+      tracker_(chain_.limits(), detail::limit_options(options)) {
   options.task.validate();
   static constexpr const char* kRows[6] = {"vx", "vy", "vz", "ωx", "ωy", "ωz"};
   for (std::size_t i = 0; i < 6; ++i) {

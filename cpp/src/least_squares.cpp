@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "active_set.hpp"
+#include "finite.hpp"
 
 namespace sigmaik {
 namespace {
@@ -48,22 +49,15 @@ int unknowns_of(const LeastSquaresProblem& p) noexcept {
       std::max({p.A.cols(), p.C.cols(), p.G.cols(), p.lower.size(), p.upper.size()}));
 }
 
-// Finite, and of one size.
 bool fits(const RowMatrix& matrix, const RowVector& right, Eigen::Index n) noexcept {
   return right.size() == matrix.rows() && (matrix.rows() == 0 || matrix.cols() == n);
-}
-
-bool finite(const double* x, Eigen::Index count) noexcept {
-  double sum = 0.0;
-  for (Eigen::Index i = 0; i < count; ++i) sum += x[i] * 0.0;
-  return sum == 0.0;
 }
 
 bool valid(const LeastSquaresProblem& p, int n) noexcept {
   if (n < 1 || n > kMaxUnknowns || p.C.rows() > kMaxEqualities || p.G.rows() > kMaxInequalities) return false;
   if (!fits(p.A, p.b, n) || !fits(p.C, p.d, n) || !fits(p.G, p.h, n)) return false;
-  if (!finite(p.A.data(), p.A.size()) || !finite(p.C.data(), p.C.size()) || !finite(p.G.data(), p.G.size()) ||
-      !finite(p.b.data(), p.b.size()) || !finite(p.d.data(), p.d.size())) {
+  if (!detail::finite(p.A) || !detail::finite(p.C) || !detail::finite(p.G) || !detail::finite(p.b) ||
+      !detail::finite(p.d)) {
     return false;
   }
   constexpr double kInfinity = std::numeric_limits<double>::infinity();

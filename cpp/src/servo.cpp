@@ -10,6 +10,7 @@
 
 #include "finite.hpp"
 #include "length.hpp"
+#include "limit_options.hpp"
 #include "message.hpp"
 
 namespace sigmaik {
@@ -117,17 +118,6 @@ JointVector furthest(const JointVector& from, const JointVector& to, const Veloc
   return rounded ? at.cwiseMax(bounds.lower).cwiseMin(bounds.upper) : at;  // not by rounding beyond what it meets
 }
 
-LimitOptions limit_options(const ServoOptions& options) {
-  LimitOptions out;
-  out.dt = options.dt;
-  out.position = options.position_limits;
-  out.velocity = options.velocity_limits;
-  out.acceleration = options.acceleration_limits;
-  out.jerk = options.jerk_limits;
-  out.recovery_speed = options.recovery_speed;
-  return out;
-}
-
 }  // namespace
 
 Servo::Servo(Chain chain, const Method& method, const ServoOptions& options)
@@ -135,7 +125,7 @@ Servo::Servo(Chain chain, const Method& method, const ServoOptions& options)
       options_(options),
       exact_{options.exact, options.task.frame},
       solver_(method, options.length_scale, options.task),
-      tracker_(chain_.limits(), limit_options(options)) {
+      tracker_(chain_.limits(), detail::limit_options(options)) {
   check_finite("gain_linear", options.gain_linear, true, "1/s");
   check_finite("gain_angular", options.gain_angular, true, "1/s");
   check("max_linear_error", options.max_linear_error, false, "m");
