@@ -3,7 +3,6 @@
 
 #include <doctest/doctest.h>
 
-#include <filesystem>
 #include <limits>
 #include <map>
 #include <numbers>
@@ -12,6 +11,7 @@
 #include <sigmaik/pose.hpp>
 #include <sigmaik/servo.hpp>
 
+#include "arms.hpp"
 #include "heap.hpp"
 #include "random.hpp"
 
@@ -40,17 +40,7 @@ std::vector<Method> all_methods() {
           JacobianSafetyProjection{}};
 }
 
-const std::map<std::string, Chain>& arms() {
-  static const std::map<std::string, Chain> all = [] {
-    std::map<std::string, Chain> found;
-    for (const auto& entry : std::filesystem::directory_iterator(SIGMAIK_ROBOTS_DIR)) {
-      if (entry.path().extension() != ".urdf") continue;
-      found.emplace(entry.path().stem().string(), Chain::from_urdf(entry.path().string(), "", "flange"));
-    }
-    return found;
-  }();
-  return all;
-}
+using test::arms;
 
 double singular_ratio(const Chain& chain, const JointVector& q) {
   ChainState state;

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <functional>
 #include <limits>
 #include <map>
@@ -17,6 +16,7 @@
 #include <sigmaik/least_squares.hpp>
 #include <sigmaik/servo.hpp>
 
+#include "arms.hpp"
 #include "heap.hpp"
 #include "random.hpp"
 
@@ -30,17 +30,7 @@ using test::VectorXd;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
-const std::map<std::string, Chain>& arms() {
-  static const std::map<std::string, Chain> all = [] {
-    std::map<std::string, Chain> found;
-    for (const auto& entry : std::filesystem::directory_iterator(SIGMAIK_ROBOTS_DIR)) {
-      if (entry.path().extension() != ".urdf") continue;
-      found.emplace(entry.path().stem().string(), Chain::from_urdf(entry.path().string(), "", "flange"));
-    }
-    return found;
-  }();
-  return all;
-}
+using test::arms;
 
 std::vector<Method> some_methods() {
   return {PseudoInverse{}, DampedLeastSquares{}, AdaptiveDampedLeastSquares{}, SelectivelyDampedLeastSquares{},

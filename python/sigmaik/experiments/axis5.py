@@ -20,9 +20,7 @@ Units: m, rad, s.
 
 from __future__ import annotations
 
-import csv
 import dataclasses
-import io
 import json
 import math
 import pathlib
@@ -35,7 +33,7 @@ from numpy.typing import NDArray
 
 import sigmaik as sk
 
-from .storage import write_atomically
+from .storage import write_atomically, write_csv
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -431,7 +429,7 @@ def save_summary(rows: Iterable[Summary], file: str | pathlib.Path) -> pathlib.P
                 columns.append(name)
                 line.append(value)
         lines.append(line)
-    return write_atomically(pathlib.Path(file), lambda stream: _write_csv(stream, columns, lines))
+    return write_atomically(pathlib.Path(file), lambda stream: write_csv(stream, columns, lines))
 
 
 def _series(track: Track) -> dict[str, Array | NDArray[np.bool_]]:
@@ -478,16 +476,7 @@ def _csv(track: Track, stream: BinaryIO) -> None:
             ends = ("x", "y", "z", "rx", "ry", "rz") if "error" in name else track.motion.chain.joint_names
             columns += [f"{name}_{end}" for end in ends]
         blocks.append(values.reshape(len(values), -1).astype(np.float64))
-    _write_csv(stream, columns, np.hstack(blocks).tolist())
-
-
-def _write_csv(stream: BinaryIO, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
-    text = io.TextIOWrapper(stream, encoding="utf-8", newline="")
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(columns)
-    writer.writerows(rows)
-    text.flush()
-    text.detach()
+    write_csv(stream, columns, np.hstack(blocks).tolist())
 
 
 # --- tables

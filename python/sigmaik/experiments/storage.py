@@ -22,7 +22,7 @@ import json
 import os
 import pathlib
 import tempfile
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import BinaryIO, Literal
 
 import numpy as np
@@ -61,7 +61,7 @@ def save_summary(rows: Iterable[Summary], file: str | pathlib.Path) -> pathlib.P
     """Summaries as CSV: a column per field of `Summary`, a line per method and waypoint, SI units."""
     columns = [field.name for field in dataclasses.fields(Summary)]
     lines = ([getattr(row, column) for column in columns] for row in rows)
-    return write_atomically(pathlib.Path(file), lambda stream: _write_csv(stream, columns, lines))
+    return write_atomically(pathlib.Path(file), lambda stream: write_csv(stream, columns, lines))
 
 
 def _npz(run: Run, stream: BinaryIO) -> None:
@@ -110,13 +110,14 @@ def _csv(run: Run, stream: BinaryIO) -> None:
             strict=True,
         )
     )
-    _write_csv(stream, columns, rows)
+    write_csv(stream, columns, rows)
 
 
 _WRITERS: dict[str, Callable[[Run, BinaryIO], None]] = {"npz": _npz, "csv": _csv}
 
 
-def _write_csv(stream: BinaryIO, columns: list[str], rows: Iterable[list[object]]) -> None:
+def write_csv(stream: BinaryIO, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
+    """Columns' names, then the rows, as UTF-8."""
     text = io.TextIOWrapper(stream, encoding="utf-8", newline="")
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(columns)
