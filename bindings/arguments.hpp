@@ -95,6 +95,7 @@ void bind_dynamics(py::module_& m);
 void bind_least_squares(py::module_& m);
 void bind_constrained_ik(py::module_& m);
 void bind_analytic_ik(py::module_& m);
+void bind_planning(py::module_& m);
 
 }  // namespace sigmaik::bindings
 

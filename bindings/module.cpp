@@ -54,4 +54,5 @@ PYBIND11_MODULE(_core, m) {
   bind_dynamics(m);
   bind_least_squares(m);
   bind_constrained_ik(m);
+  bind_planning(m);
 }

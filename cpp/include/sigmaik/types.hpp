@@ -15,6 +15,9 @@ inline constexpr int kMaxTask = 6;     ///< most task rows
 
 /// One number a joint: position [rad or m], velocity, … of up to 16 joints.
 using JointVector = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, kMaxJoints, 1>;
+/// Square in the joints, up to 16×16: a Hessian in q.
+using JointMatrix =
+    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kMaxJoints, kMaxJoints>;
 /// One number a task row, up to 6.
 using TaskVector = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, kMaxTask, 1>;
 /// Square in the task's rows, up to 6×6.

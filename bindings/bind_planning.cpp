@@ -1,0 +1,89 @@
+#include <sigmaik/planning/time_optimal.hpp>
+
+#include "arguments.hpp"
+
+namespace sigmaik::bindings {
+namespace {
+
+using planning::JointCost;
+using planning::TimeOptimal;
+using planning::TimeOptimalOptions;
+using planning::TimeOptimalProblem;
+using planning::TimeOptimalResult;
+
+// (N, n) from C order.
+py::array_t<double> nodes(const std::vector<double>& values, int n) {
+  py::array_t<double> out({static_cast<py::ssize_t>(values.size()) / n, static_cast<py::ssize_t>(n)});
+  std::copy(values.begin(), values.end(), out.mutable_data());
+  return out;
+}
+
+}  // namespace
+
+void bind_planning(py::module_& m) {
+  py::class_<JointCost, std::shared_ptr<JointCost>>(m, "JointCost",
+                                                    "A smooth cost of joint positions, with its derivatives.")
+      .def_property_readonly("dof", &JointCost::dof, "Number of joints, n.")
+      .def(
+          "value",
+          [](const JointCost& c, const ArrayLike& q) { return c.value(joint_argument(q, "q", c.dof())); },
+          py::arg("q"), "Cost at q (n,).")
+      .def(
+          "model",
+          [](const JointCost& c, const ArrayLike& q) -> py::typing::Tuple<py::float_, py::array_t<double>, py::array_t<double>> {
+            JointVector gradient(c.dof());
+            JointMatrix hessian(c.dof(), c.dof());
+            const double value = c.model(joint_argument(q, "q", c.dof()), gradient, hessian);
+            return py::make_tuple(value, to_numpy(gradient), to_numpy(hessian));
+          },
+          py::arg("q"), "Cost, gradient (n,) and Hessian (n, n) at q (n,).");
+
+  py::class_<TimeOptimal>(m, "TimeOptimal",
+                          "Time-optimal motions of one arm with one cost, after Beck et al. (2022), by an interior-point\n"
+                          "method made for double integrators. `sigmaik.planning.time_optimal` is what to call.")
+      .def(py::init([](const Chain& chain, const std::shared_ptr<JointCost>& cost, int node_count, double time_weight,
+                       double effort_weight, double tolerance, int max_iterations, bool restarts) {
+             return TimeOptimal(chain, cost,
+                                {node_count, time_weight, effort_weight, tolerance, max_iterations, restarts});
+           }),
+           py::arg("chain"), py::arg("cost").none(true), py::kw_only(), py::arg("nodes") = TimeOptimalOptions{}.nodes,
+           py::arg("time_weight") = TimeOptimalOptions{}.time_weight,
+           py::arg("effort_weight") = TimeOptimalOptions{}.effort_weight,
+           py::arg("tolerance") = TimeOptimalOptions{}.tolerance,
+           py::arg("max_iterations") = TimeOptimalOptions{}.max_iterations,
+           py::arg("restarts") = TimeOptimalOptions{}.restarts,
+           "Raises Error where an option is out of its range.")
+      .def(
+          "solve",
+          [](TimeOptimal& t, const ArrayLike& start, const ArrayLike& goal, const MaybeArray& start_velocity,
+             const MaybeArray& goal_velocity, const MaybeArray& bend) {
+            const int n = t.chain().dof();
+            const TimeOptimalProblem problem{joint_argument(start, "start", n), joint_argument(goal, "goal", n),
+                                             optional_joint_argument(object_of(start_velocity), "start_velocity", n),
+                                             optional_joint_argument(object_of(goal_velocity), "goal_velocity", n),
+                                             optional_joint_argument(object_of(bend), "bend", n)};
+            py::gil_scoped_release release;
+            return t.solve(problem);
+          },
+          py::arg("start"), py::arg("goal"), py::arg("start_velocity") = py::none(),
+          py::arg("goal_velocity") = py::none(), py::arg("bend") = py::none(),
+          "A motion between (n,) positions and velocities; `bend` (n,) is added to the first guess half-way.\n\n"
+          "Raises Error where an end is outside its limits. One call at a time for each object.");
+
+  py::class_<TimeOptimalResult>(m, "TimeOptimalResult", "Answer of TimeOptimal.solve().")
+      .def_property_readonly("status", [](const TimeOptimalResult& r) { return std::string(to_string(r.status)); },
+                             "'optimal', 'feasible' (within all constraints, but there is something to gain) or 'failed'.")
+      .def_readonly("duration", &TimeOptimalResult::duration, "[s] t_F = N h.")
+      .def_readonly("cost", &TimeOptimalResult::cost, "The objective.")
+      .def_readonly("gap", &TimeOptimalResult::gap, "Estimate of what is left to gain.")
+      .def_readonly("iterations", &TimeOptimalResult::iterations, "Newton steps, of all starts.")
+      .def_readonly("starts", &TimeOptimalResult::starts, "First guesses tried.")
+      .def(
+          "nodes",
+          [](const TimeOptimalResult& r, int n) -> py::typing::Tuple<py::array_t<double>, py::array_t<double>, py::array_t<double>> {
+            return py::make_tuple(nodes(r.q, n), nodes(r.qdot, n), nodes(r.qddot, n));
+          },
+          py::arg("dof"), "q, q̇, q̈ (N, n), or (0, n) where failed.");
+}
+
+}  // namespace sigmaik::bindings

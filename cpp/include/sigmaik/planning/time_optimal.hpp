@@ -1,0 +1,104 @@
+#pragma once
+/// \file time_optimal.hpp
+/// From one configuration to another in the least time, at little effort, within limits, away from what a cost marks:
+/// direct transcription with free end time of a double integrator per joint (Beck et al. 2022, eqs. 21 to 27).
+///
+/// With N nodes, step h = t_F/N and q̈ constant over a step,
+///
+///     min  w_t t_F + w_e Σ_k q̈_kᵀ q̈_k + Σ_k L(q_k)      over t_F, q_k, q̇_k, q̈_k
+///     q_{k+1} = q_k + h q̇_k + h²/2 q̈_k,   q̇_{k+1} = q̇_k + h q̈_k,   k = 0 … N−2
+///     (q_0, q̇_0) and (q_{N−1}, q̇_{N−1}) given,   lower ≤ q_k ≤ upper,   |q̇_k| ≤ velocity,   |q̈_k| ≤ acceleration
+///
+/// As printed in the paper, h is t_F/N where the motion takes N − 1 steps: the last one, of length h, is spent at the
+/// goal. Velocities and positions within their limits at the nodes are so between them too, but for what positions
+/// overshoot where a velocity changes its sign within a step, at most h²/8 times the acceleration.
+///
+/// Solved by a primal-dual interior-point method whose every iterate satisfies the dynamics: in p = h q̇ and a = h² q̈ they
+/// do not know h, so that a Newton step is one Riccati recursion with one more column for h. Answers are local minima.
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include <sigmaik/chain.hpp>
+#include <sigmaik/planning/joint_cost.hpp>
+
+namespace sigmaik::planning {
+
+/// Settings of a TimeOptimal.
+struct TimeOptimalOptions {
+  int nodes = 30;              ///< N, 5 to 10 000
+  double time_weight = 1.0;    ///< [1/s] > 0, w_t
+  double effort_weight = 1.0;  ///< [s⁴/rad²] ≥ 0, w_e; > 0 where a joint has no acceleration limit
+  double tolerance = 1e-9;     ///< in [1e-12, 1e-2]: what is left to gain, as a part of the objective between the ends
+  int max_iterations = 200;    ///< ≥ 1, Newton steps of a start
+  /// Where the way found still leads through what the cost marks, look on either side of it too, and keep the best.
+  bool restarts = true;
+};
+
+/// Ends of a motion, and where to look for it.
+struct TimeOptimalProblem {
+  JointVector start, goal;                    ///< (n,) [rad or m] within the limits; whole turns count
+  JointVector start_velocity, goal_velocity;  ///< (n,) [rad/s or m/s] within the limits; empty: at rest
+  /// (n,) [rad or m] by how much the first guess, the straight line, is bent half-way; empty: not at all.
+  JointVector bend;
+};
+
+/// How a solve ended.
+enum class PlanStatus : std::int8_t {
+  Optimal = 0,   ///< a local minimum, to the tolerance
+  Feasible = 1,  ///< stopped before: within all constraints, but there is something to gain
+  Failed = 2,    ///< no motion within the constraints was found, and none is returned
+};
+
+/// "optimal", "feasible", "failed".
+const char* to_string(PlanStatus status) noexcept;
+
+/// A motion on nodes t_k = k h.
+struct TimeOptimalResult {
+  PlanStatus status = PlanStatus::Failed;
+  double duration = 0.0;  ///< [s] t_F = N h
+  double cost = 0.0;      ///< the objective
+  double gap = 0.0;       ///< estimate of what is left to gain
+  int iterations = 0;     ///< Newton steps, of all starts
+  int starts = 0;         ///< first guesses tried
+  /// (N, n) in C order: positions, velocities, accelerations; empty where failed. q̈ of the last node is zero.
+  std::vector<double> q, qdot, qddot;
+};
+
+/// Plans for one arm and one cost, again and again: keeps its memory. One a thread.
+class TimeOptimal {
+ public:
+  /// \param cost L, or null for none
+  /// \throws Error where an option is out of its range, the cost is for another number of joints, or nothing bounds a
+  ///     joint's acceleration
+  TimeOptimal(Chain chain, JointCostPtr cost, const TimeOptimalOptions& options = {});
+  ~TimeOptimal();
+  TimeOptimal(TimeOptimal&&) noexcept;
+  TimeOptimal& operator=(TimeOptimal&&) noexcept;
+
+  /// \throws Error where an end is outside its limits, not finite or of a wrong size
+  TimeOptimalResult solve(const TimeOptimalProblem& problem);
+
+  const Chain& chain() const noexcept { return chain_; }
+  const JointCostPtr& cost() const noexcept { return cost_; }
+  const TimeOptimalOptions& options() const noexcept { return options_; }
+
+  /// One start of the method, for one width of vectors.
+  class Engine {
+   public:
+    virtual ~Engine() = default;
+    virtual TimeOptimalResult solve(const TimeOptimalProblem& problem) = 0;
+  };
+
+ private:
+  void check(const TimeOptimalProblem& problem) const;
+  JointVector way_out(const TimeOptimalResult& found) const;
+
+  Chain chain_;
+  JointCostPtr cost_;
+  TimeOptimalOptions options_;
+  std::unique_ptr<Engine> engine_;
+};
+
+}  // namespace sigmaik::planning
