@@ -1,0 +1,183 @@
+"""Time-optimal motions that keep clear of singularities (Beck et al. 2022, eqs. 21 to 27)."""
+
+from __future__ import annotations
+
+import functools
+import math
+import time
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sigmaik import _core, singularities
+from sigmaik._core import Chain
+
+from .clearance import Clearance, clearance
+from .trajectory import Trajectory
+
+__all__ = ["ETA1", "ETA2", "Avoid", "Solver", "time_optimal"]
+
+Array = NDArray[np.float64]
+Avoid = Literal["manipulability", "potential"]
+Solver = Literal["sigmaik", "ipopt", "fatrop"]
+
+ETA1 = math.log(2400.0)
+"""log of a potential's height (Beck et al. 2022, table 2)."""
+ETA2 = 400.0
+"""[1/rad²] of a potential, its inverse squared width (Beck et al. 2022, table 2)."""
+
+DENSE = 10
+"""Samples of a step where clearance is measured."""
+BEND = 0.6
+"""[rad] by which the first guess of a second start is bent."""
+
+
+@dataclass(frozen=True)
+class Objective:
+    """All that a solver object depends on, but for the arm. Hashable: solvers are built once for each."""
+
+    avoid: Avoid | None
+    nodes: int
+    time_weight: float
+    effort_weight: float
+    avoid_weight: float
+    epsilon: float
+    eta1: float
+    eta2: float
+    generic_manipulability: bool
+    tolerance: float
+    max_iterations: int
+    restarts: bool
+
+
+def time_optimal(
+    chain: Chain,
+    start: ArrayLike,
+    goal: ArrayLike,
+    avoid: Avoid | None = None,
+    nodes: int = 30,
+    time_weight: float = 1.0,
+    effort_weight: float = 1.0,
+    avoid_weight: float = 1e2,
+    epsilon: float = 1e-6,
+    eta1: float = ETA1,
+    eta2: float = ETA2,
+    acceleration: ArrayLike | None = None,
+    *,
+    start_velocity: ArrayLike | None = None,
+    goal_velocity: ArrayLike | None = None,
+    sets: singularities.SingularSets | None = None,
+    generic_manipulability: bool = False,
+    restarts: bool = True,
+    solver: Solver = "sigmaik",
+    tolerance: float = 1e-9,
+    max_iterations: int = 200,
+) -> Trajectory:
+    """A motion from start to goal in little time, at little effort, within limits, clear of singularities.
+
+    Minimises ``time_weight t_F + effort_weight Σ q̈_kᵀ q̈_k + Σ L(q_k)`` over N nodes, t_k = k h, h = t_F/N, as in
+    Beck et al. (2022), eqs. 21 to 27: a double integrator for each joint, q̈ constant over a step, free t_F, the chain's
+    limits of position, velocity and acceleration at every node. With
+
+        avoid=None              L = 0
+        avoid="manipulability"  L = avoid_weight / (m(q) + epsilon), m = √det(JJᵀ)                      (23)
+        avoid="potential"       L = avoid_weight Σ_i exp(eta1 − eta2 ψ_i(q)), ψ_i = 0 on singular set i (26), (27)
+
+    Parameters
+    ----------
+    start, goal
+        (n,) [rad or m] within the limits. Whole turns count: 0 and 2π are different places.
+    nodes
+        N, at least 5.
+    acceleration
+        (n,) [rad/s² or m/s²] or one number, instead of the chain's limits.
+    start_velocity, goal_velocity
+        (n,) [rad/s or m/s] at the ends; by default at rest.
+    sets
+        The arm's singular sets; by default `singularities.of(chain)`. "potential" needs them.
+    generic_manipulability
+        Take m from the Jacobian though a closed form is known: what an arm without one costs.
+    restarts
+        Where the motion found still leads through what is to be avoided, look on the other sides too.
+    solver
+        "sigmaik": an interior-point method made for this problem. "ipopt", "fatrop": general ones, by CasADi (extra
+        `plan`), for comparison.
+
+    Returns
+    -------
+    Trajectory
+        with ``duration`` = t_F = N h as the paper defines h: the last step of length h is spent at the goal. `status`
+        says whether it is "optimal" (a local minimum), "feasible" (stopped before), or "failed": then there are no
+        samples. Whatever is returned keeps the dynamics and all limits. `clearance` tells m and ψ between the nodes,
+        and which crossings of singular sets no path could avoid.
+
+    Raises
+    ------
+    ValueError
+        where an end or an option is out of its range, where "potential" is asked for and the arm's sets are not known,
+        or with the name of the extra where CasADi is not installed.
+    """
+    if avoid not in (None, "manipulability", "potential"):
+        raise ValueError(f"avoid = {avoid!r} must be None, 'manipulability' or 'potential'")
+    if solver not in ("sigmaik", "ipopt", "fatrop"):
+        raise ValueError(f"solver = {solver!r} must be 'sigmaik', 'ipopt' or 'fatrop'")
+    if acceleration is not None:
+        chain = chain.with_limits(acceleration=acceleration)
+    sets = sets or _sets(chain)
+    if avoid == "potential" and sets is None:
+        raise ValueError(
+            "the singular sets of this arm are not known; avoid='manipulability' needs none. Known are: "
+            + ", ".join(singularities.names())
+        )
+    objective = Objective(
+        avoid,
+        nodes,
+        time_weight,
+        effort_weight,
+        avoid_weight,
+        epsilon,
+        eta1,
+        eta2,
+        generic_manipulability,
+        tolerance,
+        max_iterations,
+        restarts,
+    )
+    ends = (start, goal, start_velocity, goal_velocity)
+    plan = _solve(chain, sets, objective, solver, ends, None)
+    if avoid is None or not restarts or plan.clearance is None or not plan.clearance.avoidable or sets is None:
+        return plan
+    return _other_sides(plan, chain, sets, objective, solver, ends)
+
+
+def _solve(
+    chain: Chain,
+    sets: singularities.SingularSets | None,
+    objective: Objective,
+    solver: Solver,
+    ends: tuple[ArrayLike, ArrayLike, ArrayLike | None, ArrayLike | None],
+    bend: Array | None,
+) -> Trajectory:
+    if solver == "sigmaik":
+        planner = _planner(chain, sets, objective)
+        begin = time.perf_counter()
+        result = planner.solve(*ends, bend)
+        solve_time = time.perf_counter() - begin
+        q, qdot, qddot = result.nodes(chain.dof)
+        status, cost, duration = result.status, result.cost, result.duration
+        iterations, starts = result.iterations, result.starts
+    else:
+        from . import nlp
+
+        begin = time.perf_counter()
+        raise NotImplementedError
+    if status == "failed":
+        empty = np.empty((0, chain.dof))
+        return Trajectory(
+            np.empty(0), empty, empty, empty, math.nan, status, math.nan, solve_time, iterations, starts
+        )
+    t = np.arange(len(q)) * (duration / len(q))
+    plan = Trajectory(t, q, qdot, qddot, duration, status, cost, solve_time, iterations, starts)
+    return replace(plan, clearance=_clearance(plan, chain, sets, objective.eta2))
