@@ -1,13 +1,9 @@
 #include <sigmaik/batch.hpp>
 
-#include <algorithm>
-#include <system_error>
-#include <thread>
-#include <vector>
-
 #include <sigmaik/velocity_solver.hpp>
 
 #include "message.hpp"
+#include "ranges.hpp"
 
 namespace sigmaik {
 namespace {
@@ -38,21 +34,7 @@ void solve_batch(const Method& method, double length_scale, const BatchShape& sh
     }
   };
 
-  // More threads than cores gain nothing. The question costs microseconds.
-  const unsigned cores = threads == 1 ? 1u : std::max(1u, std::thread::hardware_concurrency());
-  const std::size_t workers = std::min({static_cast<std::size_t>(threads), shape.count, std::size_t{cores}});
-  if (workers <= 1) return work(0, shape.count);
-  std::vector<std::thread> pool;
-  pool.reserve(workers - 1);
-  const auto part = [&](std::size_t w) { return shape.count * w / workers; };
-  std::size_t started = 1;
-  try {
-    for (; started < workers; ++started) pool.emplace_back(work, part(started), part(started + 1));
-  } catch (const std::system_error&) {  // no more threads to be had: the rest is done here
-  }
-  work(0, part(1));
-  work(part(started), shape.count);
-  for (std::thread& thread : pool) thread.join();
+  detail::split_range(shape.count, threads, work);
 }
 
 }  // namespace sigmaik

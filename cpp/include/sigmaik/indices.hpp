@@ -1,0 +1,90 @@
+#pragma once
+/// \file indices.hpp
+/// How far from singular: indices of a Jacobian and their gradients in the joints.
+///
+/// All come from the singular values σ_1 ≥ … ≥ σ_m of an m×n Jacobian J; where n < m the missing ones are zero, as such a
+/// task cannot be done whole. Lengths and angles mix in J: `length_scale` [m] says how much of a length weighs as much as
+/// one radian, as in VelocitySolver.
+
+#include <cstddef>
+#include <string>
+
+#include <sigmaik/chain.hpp>
+#include <sigmaik/kinematics.hpp>
+#include <sigmaik/types.hpp>
+
+namespace sigmaik {
+
+enum class Index {
+  Manipulability,    ///< √det(JJᵀ) = Π σ_i (Yoshikawa 1985)
+  ConditionNumber,   ///< σ_1/σ_m, 1 at best, +inf at a singularity (the dexterity index of Petrović et al., eq. 5)
+  MinSingularValue,  ///< σ_m
+  /// ‖log(Σ^{-1/2} JJᵀ Σ^{-1/2})‖_F², squared distance between ellipsoids in the affine-invariant metric, Σ = kI where no
+  /// other is given (Petrović et al., eqs. 8 to 12): 0 where JJᵀ = Σ, +inf at a singularity.
+  GeometryAware,
+};
+
+/// "manipulability", "condition_number", "min_singular_value", "geometry_aware".
+const char* to_string(Index index) noexcept;
+
+/// λ = σ² that a metre-sized arm's largest eigenvalue of JJᵀ does not exceed: k where nothing else is known.
+inline constexpr double kDefaultScale = 6.0;
+
+struct IndexOptions {
+  double k = kDefaultScale;   ///< > 0, of the geometry-aware index: Σ = kI
+  /// (m, m) symmetric positive definite, Σ instead of kI; empty: kI.
+  TaskMatrix sigma{};
+  double length_scale = 1.0;  ///< [m] > 0
+};
+
+/// An index with its options checked and prepared.
+class IndexFunction {
+ public:
+  /// \throws Error where an option is out of its range or Σ is not positive definite
+  explicit IndexFunction(Index index, const IndexOptions& options = {});
+
+  Index index() const noexcept { return index_; }
+  /// Rows of the Jacobians that it takes; 0: any.
+  int rows() const noexcept { return static_cast<int>(whiten_.rows()); }
+
+  /// Of an m×n Jacobian of finite entries; from the fourth on its rows are angular. Real time.
+  double value(const TaskJacobianRef& jacobian) const noexcept;
+
+  /// Of a chain at q (n,), with the gradient (n,) [per rad or m]. Real time.
+  ///
+  /// Closed form through ∂J/∂q: ∂σ_i/∂q_k = u_iᵀ ∂_kJ v_i. The gradient is always finite. Where an index is not
+  /// differentiable it is the slope along the u_i, v_i that the decomposition picked: at a repeated σ_min, and at σ_min = 0,
+  /// where the slope of |σ| has either sign. Where the index is +inf (condition number, geometry-aware, at a singularity)
+  /// nothing points out, and the gradient is zero.
+  double value(const Chain& chain, const JointRef& q, JointVector& gradient) const noexcept;
+  /// The same, from J and its chain alone.
+  double gradient(const Jacobian& jacobian, JointVector& gradient) const noexcept;
+
+ private:
+  Index index_;
+  double angular_, inverse_k_;
+  TaskMatrix whiten_;  // Σ^{-1/2}, or empty
+};
+
+/// Π σ_i of an m×n Jacobian. Real time, as all of these.
+double manipulability(const TaskJacobianRef& jacobian) noexcept;
+/// σ_1/σ_m, +inf where σ_m = 0.
+double condition_number(const TaskJacobianRef& jacobian) noexcept;
+/// σ_m.
+double min_singular_value(const TaskJacobianRef& jacobian) noexcept;
+/// Σ log²(σ_i²/k), +inf where a σ_i = 0.
+double geometry_aware(const TaskJacobianRef& jacobian, double k = kDefaultScale) noexcept;
+
+/// k of a chain: kDefaultScale where the largest eigenvalue of JJᵀ over the joint ranges stays below it by a tenth, else
+/// that eigenvalue times 1.1, so that the sphere Σ = kI holds every ellipsoid. Found by 1000 quasi-random configurations
+/// and an ascent from the best: the same on every machine, a few ms.
+double reference_scale(const Chain& chain, double length_scale = 1.0);
+
+/// Values, and gradients where `gradient` is not null, at `count` configurations.
+/// \param q (count, n) in C order, finite
+/// \param value out: (count,)   \param gradient out: (count, n), or null
+/// \param threads ≥ 1, the most that work at once
+void evaluate(const Chain& chain, const IndexFunction& index, std::size_t count, const double* q, double* value,
+              double* gradient = nullptr, int threads = 1);
+
+}  // namespace sigmaik
