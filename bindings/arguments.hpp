@@ -10,6 +10,7 @@
 #include <array>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include <sigmaik/sigmaik.hpp>
 
@@ -82,6 +83,40 @@ py::array_t<double> to_numpy(const Eigen::MatrixBase<Derived>& values) {
   }
 }
 
+/// Calls fill(q, out) for q (n,), or for every row of q (B, n) without the GIL; `shape` is that of one result.
+template <typename Fill>
+py::array_t<double> map_configurations(int n, const py::object& object, std::vector<py::ssize_t> shape,
+                                       Fill fill) {
+  const std::string need = "(" + std::to_string(n) + ",) or (B, " + std::to_string(n) + ")";
+  py::array any = py::array::ensure(object);
+  if (!any) PyErr_Clear();
+  const bool batch = any && any.ndim() == 2;
+  const Array q = batch ? array_argument(any, "q", {-1, n}, need.c_str()) : array_argument(object, "q", {n}, need.c_str());
+  const py::ssize_t count = batch ? q.shape(0) : 1;
+  py::ssize_t size = 1;
+  for (const py::ssize_t length : shape) size *= length;
+  if (batch) shape.insert(shape.begin(), count);
+  py::array_t<double> out(shape);
+  double* data = out.mutable_data();
+  const double* from = q.data();
+  {
+    py::gil_scoped_release release;
+    for (py::ssize_t b = 0; b < count; ++b) {
+      fill(JointVector(Eigen::Map<const Eigen::VectorXd>(from + b * n, n)), data + b * size);
+    }
+  }
+  return out;
+}
+
+/// A number for an array of no dimensions, else the array.
+inline py::object number_or_array(const py::array_t<double>& array) {
+  if (array.ndim() == 0) return py::float_(*array.data());
+  return array;
+}
+
+/// Texts.
+using Strings = py::typing::Tuple<py::str, py::ellipsis>;
+
 /// Positions of the bits that are set.
 using Indices = py::typing::Tuple<py::int_, py::ellipsis>;
 Indices indices(std::uint32_t bits);
@@ -95,6 +130,8 @@ void bind_dynamics(py::module_& m);
 void bind_least_squares(py::module_& m);
 void bind_constrained_ik(py::module_& m);
 void bind_analytic_ik(py::module_& m);
+void bind_indices(py::module_& m);
+void bind_singularities(py::module_& m);
 void bind_planning(py::module_& m);
 
 }  // namespace sigmaik::bindings

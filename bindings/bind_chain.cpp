@@ -6,34 +6,6 @@
 namespace sigmaik::bindings {
 namespace {
 
-// Calls fill(q, out) for q (n,), or for every row of q (B, n) without the GIL; `shape` is that of one result.
-template <typename Fill>
-py::array_t<double> map_configurations(const Chain& chain, const py::object& object, std::vector<py::ssize_t> shape,
-                                       Fill fill) {
-  const int n = chain.dof();
-  const std::string need = "(" + std::to_string(n) + ",) or (B, " + std::to_string(n) + ")";
-  py::array any = py::array::ensure(object);
-  if (!any) PyErr_Clear();
-  const bool batch = any && any.ndim() == 2;
-  const Array q = batch ? array_argument(any, "q", {-1, n}, need.c_str()) : array_argument(object, "q", {n}, need.c_str());
-  const py::ssize_t count = batch ? q.shape(0) : 1;
-  py::ssize_t size = 1;
-  for (const py::ssize_t length : shape) size *= length;
-  if (batch) shape.insert(shape.begin(), count);
-  py::array_t<double> out(shape);
-  double* data = out.mutable_data();
-  const double* from = q.data();
-  {
-    py::gil_scoped_release release;
-    for (py::ssize_t b = 0; b < count; ++b) {
-      fill(JointVector(Eigen::Map<const Eigen::VectorXd>(from + b * n, n)), data + b * size);
-    }
-  }
-  return out;
-}
-
-using Strings = py::typing::Tuple<py::str, py::ellipsis>;
-
 template <int kRows>
 using RowMajor = Eigen::Matrix<double, kRows, Eigen::Dynamic, Eigen::RowMajor>;
 
@@ -126,7 +98,7 @@ void bind_chain(py::module_& m) {
       .def(
           "pose",
           [](const Chain& c, const ArrayLike& q) {
-            return map_configurations(c, q, {4, 4}, [&c](const JointVector& joints, double* out) {
+            return map_configurations(c.dof(), q, {4, 4}, [&c](const JointVector& joints, double* out) {
               Eigen::Map<Eigen::Matrix<double, 4, 4, Eigen::RowMajor>> result(out);
               result = pose(c, joints).matrix();
             });
@@ -136,7 +108,7 @@ void bind_chain(py::module_& m) {
           "jacobian",
           [](const Chain& c, const ArrayLike& q) {
             ChainState state;
-            return map_configurations(c, q, {6, c.dof()}, [&c, &state](const JointVector& joints, double* out) {
+            return map_configurations(c.dof(), q, {6, c.dof()}, [&c, &state](const JointVector& joints, double* out) {
               update(c, joints, state);
               Eigen::Map<RowMajor<6>>(out, 6, c.dof()) = state.jacobian;
             });
@@ -149,7 +121,7 @@ void bind_chain(py::module_& m) {
             ChainState state;
             JacobianGradient gradient;
             const int n = c.dof();
-            return map_configurations(c, q, {n, 6, n}, [&](const JointVector& joints, double* out) {
+            return map_configurations(c.dof(), q, {n, 6, n}, [&](const JointVector& joints, double* out) {
               update(c, joints, state);
               jacobian_gradient(state.jacobian, gradient);
               for (int k = 0; k < n; ++k) {

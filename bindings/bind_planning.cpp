@@ -1,3 +1,4 @@
+#include <sigmaik/planning/costs.hpp>
 #include <sigmaik/planning/time_optimal.hpp>
 
 #include "arguments.hpp"
@@ -37,6 +38,25 @@ void bind_planning(py::module_& m) {
             return py::make_tuple(value, to_numpy(gradient), to_numpy(hessian));
           },
           py::arg("q"), "Cost, gradient (n,) and Hessian (n, n) at q (n,).");
+
+  m.def(
+      "potential_cost",
+      [](const SingularSets& sets, double weight, double eta1, double eta2) {
+        return std::const_pointer_cast<JointCost>(planning::potential_cost(sets, {.eta1 = eta1, .eta2 = eta2}, weight));
+      },
+      py::arg("sets"), py::arg("weight"), py::arg("eta1"), py::arg("eta2"), "weight · Σ_i exp(η₁ − η₂ ψ_i(q)).");
+  m.def(
+      "manipulability_cost",
+      [](const SingularSets& sets, double weight, double epsilon) {
+        return std::const_pointer_cast<JointCost>(planning::manipulability_cost(sets, weight, epsilon));
+      },
+      py::arg("sets"), py::arg("weight"), py::arg("epsilon"), "weight/(m(q) + ε), m in closed form.");
+  m.def(
+      "manipulability_cost",
+      [](const Chain& chain, double weight, double epsilon) {
+        return std::const_pointer_cast<JointCost>(planning::manipulability_cost(chain, weight, epsilon));
+      },
+      py::arg("chain"), py::arg("weight"), py::arg("epsilon"), "weight/(m(q) + ε), m from the Jacobian.");
 
   py::class_<TimeOptimal>(m, "TimeOptimal",
                           "Time-optimal motions of one arm with one cost, after Beck et al. (2022), by an interior-point\n"

@@ -11,7 +11,7 @@
 Units are m, rad, s, N·m. Twists and Jacobians are [v; ω], in base axes, at the tip's origin.
 """
 
-from . import robots
+from . import indices, planning, robots, singularities
 from ._core import (
     AdaptiveDampedLeastSquares,
     AnalyticBranch,
@@ -69,10 +69,13 @@ __all__ = [
     "Status",
     "VelocitySolver",
     "__version__",
+    "indices",
     "least_squares",
+    "planning",
     "pose_error",
     "robots",
     "rotation_exp",
     "rotation_log",
+    "singularities",
     "solve_batch",
 ]

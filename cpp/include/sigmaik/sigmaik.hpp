@@ -17,9 +17,13 @@
 ///     limits.hpp           LimitTracker: position, velocity, acceleration and jerk limits → this cycle's bounds
 ///     least_squares.hpp    LeastSquares: equalities, bounds and inequalities, always with an answer
 ///     servo.hpp            Servo: pose or twist in, joint command out, each cycle
+///     indices.hpp          manipulability, condition number, smallest singular value, geometry-aware index; gradients
+///     singularities.hpp    SingularSets: known singular sets of three arms, potentials, manipulability in closed form
 ///     analytic_ik.hpp      AnalyticIk: every posture of a pose, for six joints with a spherical wrist
 ///     dynamics.hpp         Dynamics: mass matrix, Coriolis, gravity, by KDL (not included)
 ///     constrained_ik.hpp   ConstrainedIk: a pose exactly in part, the rest as limits allow; time scaling (not included)
+///     planning/time_optimal.hpp  TimeOptimal: motions within limits, away from what a cost marks (not included)
+///     planning/costs.hpp         costs for it: potentials, manipulability (not included)
 ///
 /// Set-up throws Error. Calls marked "real time" are noexcept, bounded, and touch neither heap nor lock.
 
@@ -27,12 +31,14 @@
 #include <sigmaik/batch.hpp>
 #include <sigmaik/chain.hpp>
 #include <sigmaik/error.hpp>
+#include <sigmaik/indices.hpp>
 #include <sigmaik/inverse.hpp>
 #include <sigmaik/kinematics.hpp>
 #include <sigmaik/least_squares.hpp>
 #include <sigmaik/limits.hpp>
 #include <sigmaik/pose.hpp>
 #include <sigmaik/servo.hpp>
+#include <sigmaik/singularities.hpp>
 #include <sigmaik/spectrum.hpp>
 #include <sigmaik/status.hpp>
 #include <sigmaik/task.hpp>

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
+import threading
 import time
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -14,14 +15,14 @@ from numpy.typing import ArrayLike, NDArray
 from sigmaik import _core, singularities
 from sigmaik._core import Chain
 
-from .clearance import Clearance, clearance
+from .clearance import Crossing, clearance
 from .trajectory import Trajectory
 
 __all__ = ["ETA1", "ETA2", "Avoid", "Solver", "time_optimal"]
 
 Array = NDArray[np.float64]
 Avoid = Literal["manipulability", "potential"]
-Solver = Literal["sigmaik", "ipopt", "fatrop"]
+Solver = Literal["sigmaik", "ipopt"]
 
 ETA1 = math.log(2400.0)
 """log of a potential's height (Beck et al. 2022, table 2)."""
@@ -102,8 +103,8 @@ def time_optimal(
     restarts
         Where the motion found still leads through what is to be avoided, look on the other sides too.
     solver
-        "sigmaik": an interior-point method made for this problem. "ipopt", "fatrop": general ones, by CasADi (extra
-        `plan`), for comparison.
+        "sigmaik": an interior-point method made for this problem. "ipopt": IPOPT with MUMPS by CasADi (extra `plan`), for
+        comparison; one start, `tolerance` is its own, relative to its scaled problem.
 
     Returns
     -------
@@ -121,11 +122,11 @@ def time_optimal(
     """
     if avoid not in (None, "manipulability", "potential"):
         raise ValueError(f"avoid = {avoid!r} must be None, 'manipulability' or 'potential'")
-    if solver not in ("sigmaik", "ipopt", "fatrop"):
-        raise ValueError(f"solver = {solver!r} must be 'sigmaik', 'ipopt' or 'fatrop'")
+    if solver not in ("sigmaik", "ipopt"):
+        raise ValueError(f"solver = {solver!r} must be 'sigmaik' or 'ipopt'")
     if acceleration is not None:
         chain = chain.with_limits(acceleration=acceleration)
-    sets = sets or _sets(chain)
+    sets = sets or singularities.of(chain)
     if avoid == "potential" and sets is None:
         raise ValueError(
             "the singular sets of this arm are not known; avoid='manipulability' needs none. Known are: "
@@ -152,16 +153,15 @@ def time_optimal(
     return _other_sides(plan, chain, sets, objective, solver, ends)
 
 
+Ends = tuple[ArrayLike, ArrayLike, ArrayLike | None, ArrayLike | None]
+Sets = singularities.SingularSets | None
+
+
 def _solve(
-    chain: Chain,
-    sets: singularities.SingularSets | None,
-    objective: Objective,
-    solver: Solver,
-    ends: tuple[ArrayLike, ArrayLike, ArrayLike | None, ArrayLike | None],
-    bend: Array | None,
+    chain: Chain, sets: Sets, objective: Objective, solver: Solver, ends: Ends, bend: Array | None
 ) -> Trajectory:
     if solver == "sigmaik":
-        planner = _planner(chain, sets, objective)
+        planner = _planners.get(chain, sets, objective)
         begin = time.perf_counter()
         result = planner.solve(*ends, bend)
         solve_time = time.perf_counter() - begin
@@ -171,8 +171,9 @@ def _solve(
     else:
         from . import nlp
 
-        begin = time.perf_counter()
-        raise NotImplementedError
+        answer = nlp.solve(chain, sets, objective, ends, bend)
+        q, qdot, qddot, status, cost, duration, iterations, solve_time = answer
+        starts = 1
     if status == "failed":
         empty = np.empty((0, chain.dof))
         return Trajectory(
@@ -180,4 +181,97 @@ def _solve(
         )
     t = np.arange(len(q)) * (duration / len(q))
     plan = Trajectory(t, q, qdot, qddot, duration, status, cost, solve_time, iterations, starts)
-    return replace(plan, clearance=_clearance(plan, chain, sets, objective.eta2))
+    dense = np.linspace(0.0, t[-1], DENSE * (len(t) - 1) + 1)
+    return replace(plan, clearance=clearance(chain, sets, dense, plan.sample(dense)[0], width=objective.eta2))
+
+
+class _Planners(threading.local):
+    """Solver objects, built once per thread, arm and objective: they keep memory of their own."""
+
+    def __init__(self) -> None:
+        self.build = functools.lru_cache(maxsize=32)(_build)
+
+    def get(self, chain: Chain, sets: Sets, objective: Objective) -> _core.TimeOptimal:
+        known = sets is not None and not (objective.avoid == "manipulability" and objective.generic_manipulability)
+        return self.build(chain, sets.name if sets is not None and known else None, objective)
+
+
+def _build(chain: Chain, sets: str | None, o: Objective) -> _core.TimeOptimal:
+    cost = None
+    if o.avoid == "potential":
+        cost = _core.potential_cost(_core.load_singular_sets(str(sets)), o.avoid_weight, o.eta1, o.eta2)
+    elif o.avoid == "manipulability":
+        arm = chain if sets is None else _core.load_singular_sets(sets)
+        cost = _core.manipulability_cost(arm, o.avoid_weight, o.epsilon)
+    return _core.TimeOptimal(
+        chain,
+        cost,
+        nodes=o.nodes,
+        time_weight=o.time_weight,
+        effort_weight=o.effort_weight,
+        tolerance=o.tolerance,
+        max_iterations=o.max_iterations,
+        restarts=o.restarts,
+    )
+
+
+_planners = _Planners()
+
+
+def _other_sides(
+    plan: Trajectory,
+    chain: Chain,
+    sets: singularities.SingularSets,
+    objective: Objective,
+    solver: Solver,
+    ends: Ends,
+) -> Trajectory:
+    """Starts once more on the other side of the first crossing that could be avoided, and keeps the better motion.
+
+    The better one is that with the smaller objective along the whole way, not only at the nodes: these can lie on either
+    side of a wall that the motion between them goes through.
+    """
+    assert plan.clearance is not None
+    bend = BEND * _other_side(sets, plan.clearance.avoidable[0], np.asarray(ends[0], dtype=np.float64))
+    room = (
+        0.4 * (chain.limits.lower - np.minimum(ends[0], ends[1])),
+        0.4 * (chain.limits.upper - np.maximum(ends[0], ends[1])),
+    )
+    other = _solve(chain, sets, objective, solver, ends, np.clip(bend, *room))
+    better = other if _along(other, sets, objective) < _along(plan, sets, objective) else plan
+    return replace(
+        better,
+        solve_time=plan.solve_time + other.solve_time,
+        iterations=plan.iterations + other.iterations,
+        starts=plan.starts + other.starts,
+    )
+
+
+def _other_side(sets: singularities.SingularSets, crossing: Crossing, start: Array) -> Array:
+    """Direction (n,), of length 1: back to the start's side of a wall; for other sets to where the motion is not."""
+    i = sets.names.index(crossing.name)
+    at = slice(sum(sets.codimensions[:i]), sum(sets.codimensions[: i + 1]))
+    step = 1e-6 * np.eye(sets.dof)
+    around = sets.signed_residuals(np.concatenate([crossing.q + step, crossing.q - step]))[:, at]
+    slope = (around[: sets.dof] - around[sets.dof :]).T / 2e-6  # (codimension, n)
+    if sets.codimensions[i] == 1:
+        aim = np.sign(sets.signed_residuals(start)[at])
+    else:
+        here = sets.signed_residuals(crossing.q)[at]
+        aim = -here if np.linalg.norm(here) > 1e-9 else np.eye(sets.codimensions[i])[0]
+    direction = np.linalg.pinv(slope) @ aim
+    length = np.linalg.norm(direction)
+    return direction / length if length > 0.0 else direction
+
+
+def _along(plan: Trajectory, sets: singularities.SingularSets, o: Objective) -> float:
+    """The objective with what is to be avoided counted all along the way; inf where the plan failed."""
+    if plan.clearance is None:
+        return math.inf
+    dense = plan.sample(plan.clearance.t)[0]
+    if o.avoid == "potential":
+        avoided = o.avoid_weight * np.sum(sets.potential(dense, o.eta1, o.eta2))
+    else:
+        avoided = o.avoid_weight * np.sum(1.0 / (plan.clearance.manipulability + o.epsilon))
+    motion = o.time_weight * plan.duration + o.effort_weight * np.sum(plan.qddot**2)
+    return float(motion + avoided / DENSE)

@@ -1,0 +1,23 @@
+#pragma once
+/// \file costs.hpp
+/// Costs that keep a plan away from singularities (Beck et al. 2022, section 3).
+
+#include <sigmaik/chain.hpp>
+#include <sigmaik/planning/joint_cost.hpp>
+#include <sigmaik/singularities.hpp>
+
+namespace sigmaik::planning {
+
+/// weight · Σ_i w_i exp(η₁ − η₂ ψ_i(q)): high near the known singular sets, and nothing elsewhere (eqs. 26, 27).
+/// \throws Error where a parameter is out of its range
+JointCostPtr potential_cost(const SingularSets& sets, const Potential& potential = {}, double weight = 1e2);
+
+/// weight/(m(q) + ε), m = √det(JJᵀ) in closed form (eq. 23).
+/// \throws Error where a parameter is out of its range
+JointCostPtr manipulability_cost(const SingularSets& sets, double weight = 1e2, double epsilon = 1e-6);
+
+/// The same for any chain, from its Jacobian. The Hessian is by differences of the gradient.
+/// \throws Error where a parameter is out of its range
+JointCostPtr manipulability_cost(const Chain& chain, double weight = 1e2, double epsilon = 1e-6);
+
+}  // namespace sigmaik::planning
