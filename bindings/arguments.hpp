@@ -109,9 +109,10 @@ py::array_t<double> map_configurations(int n, const py::object& object, std::vec
 }
 
 /// A number for an array of no dimensions, else the array.
-inline py::object number_or_array(const py::array_t<double>& array) {
-  if (array.ndim() == 0) return py::float_(*array.data());
-  return array;
+using NumberOrArray = py::typing::Union<py::float_, py::array_t<double>>;
+inline NumberOrArray number_or_array(const py::array_t<double>& array) {
+  if (array.ndim() == 0) return NumberOrArray(py::float_(*array.data()));
+  return NumberOrArray(array);
 }
 
 /// Texts.

@@ -43,7 +43,7 @@ void bind_indices(py::module_& m) {
   m.attr("DEFAULT_SCALE") = kDefaultScale;
   m.def(
       "index_of_jacobian",
-      [](const ArrayLike& jacobian, const std::string& index, const ArrayLike& k, double length_scale) -> py::object {
+      [](const ArrayLike& jacobian, const std::string& index, const ArrayLike& k, double length_scale) -> NumberOrArray {
         const IndexFunction function = function_argument(index, k, length_scale);
         const auto of = [&function](const TaskJacobian& j) {
           if (function.rows() != 0 && function.rows() != j.rows()) {
@@ -53,7 +53,7 @@ void bind_indices(py::module_& m) {
         };
         py::array any = py::array::ensure(jacobian);
         if (!any) PyErr_Clear();
-        if (!any || any.ndim() != 3) return py::float_(of(jacobian_argument(jacobian, "J")));
+        if (!any || any.ndim() != 3) return NumberOrArray(py::float_(of(jacobian_argument(jacobian, "J"))));
         const Array all = array_argument(any, "J", {-1, -1, -1}, "(m, n) or (B, m, n)");
         const auto count = all.shape(0), rows = all.shape(1), cols = all.shape(2);
         if (rows < 1 || rows > kMaxTask || cols < 1 || cols > kMaxJoints) {
@@ -70,7 +70,7 @@ void bind_indices(py::module_& m) {
                     all.data() + b * rows * cols, rows, cols)));
           }
         }
-        return out;
+        return NumberOrArray(out);
       },
       py::arg("J"), py::arg("index"), py::arg("k") = kDefaultScale, py::arg("length_scale") = 1.0,
       "An index of J (m, n), or (B,) of J (B, m, n).");

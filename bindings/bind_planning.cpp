@@ -58,15 +58,30 @@ void bind_planning(py::module_& m) {
       },
       py::arg("chain"), py::arg("weight"), py::arg("epsilon"), "weight/(m(q) + ε), m from the Jacobian.");
 
+  py::class_<TimeOptimalResult>(m, "TimeOptimalResult", "Answer of TimeOptimal.solve().")
+      .def_property_readonly("status", [](const TimeOptimalResult& r) { return std::string(to_string(r.status)); },
+                             "'optimal', 'feasible' (within all constraints, but there is something to gain) or 'failed'.")
+      .def_readonly("duration", &TimeOptimalResult::duration, "[s] t_F = N h.")
+      .def_readonly("cost", &TimeOptimalResult::cost, "The objective.")
+      .def_readonly("gap", &TimeOptimalResult::gap, "Estimate of what is left to gain.")
+      .def_readonly("iterations", &TimeOptimalResult::iterations, "Newton steps, of all starts.")
+      .def_readonly("starts", &TimeOptimalResult::starts, "First guesses tried.")
+      .def(
+          "nodes",
+          [](const TimeOptimalResult& r, int n) -> py::typing::Tuple<py::array_t<double>, py::array_t<double>, py::array_t<double>> {
+            return py::make_tuple(nodes(r.q, n), nodes(r.qdot, n), nodes(r.qddot, n));
+          },
+          py::arg("dof"), "q, q̇, q̈ (N, n), or (0, n) where failed.");
+
   py::class_<TimeOptimal>(m, "TimeOptimal",
                           "Time-optimal motions of one arm with one cost, after Beck et al. (2022), by an interior-point\n"
                           "method made for double integrators. `sigmaik.planning.time_optimal` is what to call.")
-      .def(py::init([](const Chain& chain, const std::shared_ptr<JointCost>& cost, int node_count, double time_weight,
+      .def(py::init([](const Chain& chain, const std::optional<std::shared_ptr<JointCost>>& cost, int node_count, double time_weight,
                        double effort_weight, double tolerance, int max_iterations, bool restarts) {
-             return TimeOptimal(chain, cost,
+             return TimeOptimal(chain, cost.value_or(nullptr),
                                 {node_count, time_weight, effort_weight, tolerance, max_iterations, restarts});
            }),
-           py::arg("chain"), py::arg("cost").none(true), py::kw_only(), py::arg("nodes") = TimeOptimalOptions{}.nodes,
+           py::arg("chain"), py::arg("cost"), py::kw_only(), py::arg("nodes") = TimeOptimalOptions{}.nodes,
            py::arg("time_weight") = TimeOptimalOptions{}.time_weight,
            py::arg("effort_weight") = TimeOptimalOptions{}.effort_weight,
            py::arg("tolerance") = TimeOptimalOptions{}.tolerance,
@@ -89,21 +104,6 @@ void bind_planning(py::module_& m) {
           py::arg("goal_velocity") = py::none(), py::arg("bend") = py::none(),
           "A motion between (n,) positions and velocities; `bend` (n,) is added to the first guess half-way.\n\n"
           "Raises Error where an end is outside its limits. One call at a time for each object.");
-
-  py::class_<TimeOptimalResult>(m, "TimeOptimalResult", "Answer of TimeOptimal.solve().")
-      .def_property_readonly("status", [](const TimeOptimalResult& r) { return std::string(to_string(r.status)); },
-                             "'optimal', 'feasible' (within all constraints, but there is something to gain) or 'failed'.")
-      .def_readonly("duration", &TimeOptimalResult::duration, "[s] t_F = N h.")
-      .def_readonly("cost", &TimeOptimalResult::cost, "The objective.")
-      .def_readonly("gap", &TimeOptimalResult::gap, "Estimate of what is left to gain.")
-      .def_readonly("iterations", &TimeOptimalResult::iterations, "Newton steps, of all starts.")
-      .def_readonly("starts", &TimeOptimalResult::starts, "First guesses tried.")
-      .def(
-          "nodes",
-          [](const TimeOptimalResult& r, int n) -> py::typing::Tuple<py::array_t<double>, py::array_t<double>, py::array_t<double>> {
-            return py::make_tuple(nodes(r.q, n), nodes(r.qdot, n), nodes(r.qddot, n));
-          },
-          py::arg("dof"), "q, q̇, q̈ (N, n), or (0, n) where failed.");
 }
 
 }  // namespace sigmaik::bindings

@@ -17,7 +17,7 @@ Potential potential_argument(const SingularSets& sets, double eta1, double eta2,
   return p;
 }
 
-using Recording = py::typing::Tuple<py::list, py::list>;
+using Recording = py::typing::Tuple<py::typing::List<py::typing::Tuple<py::object, py::ellipsis>>, py::typing::List<py::int_>>;
 
 // Operations ("constant", value), ("sin" or "cos", joint) or ("+", "-" or "*", a, b), and the results' indices.
 Recording recording(const Tape& tape) {
@@ -111,7 +111,7 @@ void bind_singularities(py::module_& m) {
           py::arg("q"), "The residuals themselves, set after set: codimensions[i] numbers for set i.")
       .def(
           "potential",
-          [](const SingularSets& s, const ArrayLike& q, double eta1, double eta2, const MaybeArray& weights) -> py::object {
+          [](const SingularSets& s, const ArrayLike& q, double eta1, double eta2, const MaybeArray& weights) -> NumberOrArray {
             const Potential p = potential_argument(s, eta1, eta2, weights);
             return number_or_array(map_configurations(
                 s.dof(), q, {}, [&](const JointVector& joints, double* out) { *out = s.potential(joints, p); }));
@@ -146,7 +146,7 @@ void bind_singularities(py::module_& m) {
           py::arg("weights") = py::none(), "Hessian (n, n) of the potential [1/rad²].")
       .def(
           "manipulability",
-          [](const SingularSets& s, const ArrayLike& q) -> py::object {
+          [](const SingularSets& s, const ArrayLike& q) -> NumberOrArray {
             return number_or_array(map_configurations(
                 s.dof(), q, {}, [&](const JointVector& joints, double* out) { *out = s.manipulability(joints); }));
           },
@@ -178,9 +178,9 @@ void bind_singularities(py::module_& m) {
       .def("_manipulability_tape", [](const SingularSets& s) { return recording(s.manipulability_tape()); },
            "See sigmaik.singularities.symbolic_manipulability_squared.")
       .def("__reduce__",
-           [](const py::object& self) {
+           [](const py::object& self) -> py::typing::Tuple<py::object, py::typing::Tuple<py::str>> {
              const py::object load = py::module_::import("sigmaik.singularities").attr("load");
-             return py::make_tuple(load, py::make_tuple(self.attr("name")));
+             return py::make_tuple(load, py::make_tuple(py::str(self.attr("name"))));
            })
       .def("__repr__", [](const SingularSets& s) {
         std::string text = "SingularSets('" + s.name() + "':";

@@ -6,7 +6,7 @@ import enum
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['AdaptiveDampedLeastSquares', 'AnalyticBranch', 'AnalyticIk', 'Chain', 'ConstrainedIk', 'ConstrainedIkStep', 'DampedLeastSquares', 'Dynamics', 'Error', 'JParse', 'JacobianProjection', 'JacobianSafety', 'JacobianSafetyProjection', 'JointLimits', 'LeastSquaresSolution', 'PseudoInverse', 'SelectivelyDampedLeastSquares', 'Servo', 'ServoStep', 'Solution', 'Spectrum', 'Status', 'VelocitySolver', 'least_squares', 'pose_error', 'rotation_exp', 'rotation_log', 'solve_batch']
+__all__: list[str] = ['AdaptiveDampedLeastSquares', 'AnalyticBranch', 'AnalyticIk', 'Chain', 'ConstrainedIk', 'ConstrainedIkStep', 'DEFAULT_SCALE', 'DampedLeastSquares', 'Dynamics', 'Error', 'JParse', 'JacobianProjection', 'JacobianSafety', 'JacobianSafetyProjection', 'JointCost', 'JointLimits', 'LeastSquaresSolution', 'PseudoInverse', 'SelectivelyDampedLeastSquares', 'Servo', 'ServoStep', 'SingularSets', 'Solution', 'Spectrum', 'Status', 'TimeOptimal', 'TimeOptimalResult', 'VelocitySolver', 'evaluate_index', 'index_of_jacobian', 'known_singular_sets', 'least_squares', 'load_singular_sets', 'manipulability_cost', 'pose_error', 'potential_cost', 'reference_scale', 'rotation_exp', 'rotation_log', 'singular_sets_of', 'solve_batch']
 class Error(ValueError):
     """
     What set-up and checked calls refuse. The text carries the facts.
@@ -791,6 +791,172 @@ class ConstrainedIk:
         """
         (4, 4) the pose that the last step aimed at: its target, slowed down by ϑ.
         """
+class SingularSets:
+    """
+    The known singular sets of an arm: potentials around them, and its manipulability in closed
+    form (Beck et al. 2022, corrected and completed). q is (n,) in the chain's angles [rad], or
+    (B, n): then every result has B rows.
+
+    Set i is where ψ_i = Σ r² vanishes; its residuals r have no unit, and near the set ψ is about
+    the squared distance in the joints' space. A set's codimension is the number of its residuals:
+    those of codimension 1 are walls, across which r changes its sign.
+    """
+    def __len__(self) -> int:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, tuple[str]]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def _manipulability_tape(self) -> tuple[list[tuple[typing.Any, ...]], list[int]]:
+        """
+        See sigmaik.singularities.symbolic_manipulability_squared.
+        """
+    def _residual_tape(self) -> tuple[list[tuple[typing.Any, ...]], list[int]]:
+        """
+        See sigmaik.singularities.symbolic_residuals.
+        """
+    def gradient(self, q: numpy.typing.ArrayLike, eta1: typing.SupportsFloat | typing.SupportsIndex = 7.783224016336037, eta2: typing.SupportsFloat | typing.SupportsIndex = 400.0, weights: numpy.typing.ArrayLike | None = None) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Gradient (n,) of the potential [1/rad].
+        """
+    def hessian(self, q: numpy.typing.ArrayLike, eta1: typing.SupportsFloat | typing.SupportsIndex = 7.783224016336037, eta2: typing.SupportsFloat | typing.SupportsIndex = 400.0, weights: numpy.typing.ArrayLike | None = None) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Hessian (n, n) of the potential [1/rad²].
+        """
+    def manipulability(self, q: numpy.typing.ArrayLike) -> float | numpy.typing.NDArray[numpy.float64]:
+        """
+        √det(JJᵀ) in closed form, accurate down to zero.
+        """
+    def manipulability_gradient(self, q: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Gradient (n,) of the manipulability; zero on a singular set, where there is none.
+        """
+    def manipulability_hessian(self, q: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Hessian (n, n) of the manipulability; zero on a singular set, where there is none.
+        """
+    def potential(self, q: numpy.typing.ArrayLike, eta1: typing.SupportsFloat | typing.SupportsIndex = 7.783224016336037, eta2: typing.SupportsFloat | typing.SupportsIndex = 400.0, weights: numpy.typing.ArrayLike | None = None) -> float | numpy.typing.NDArray[numpy.float64]:
+        """
+        Σ_i w_i exp(η₁ − η₂ ψ_i(q)); w (c,), by default ones.
+        """
+    def residuals(self, q: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        ψ (c,) ≥ 0 of every set, zero exactly on it.
+        """
+    def signed_residuals(self, q: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The residuals themselves, set after set: codimensions[i] numbers for set i.
+        """
+    @property
+    def codimensions(self) -> tuple[int, ...]:
+        """
+        Number of residuals of each set.
+        """
+    @property
+    def conditions(self) -> tuple[str, ...]:
+        """
+        What holds on each set, in words.
+        """
+    @property
+    def dof(self) -> int:
+        """
+        Number of joints, n.
+        """
+    @property
+    def joints(self) -> tuple[tuple[int, ...], ...]:
+        """
+        Indices of the joints in each condition.
+        """
+    @property
+    def name(self) -> str:
+        """
+        Of the arm.
+        """
+    @property
+    def names(self) -> tuple[str, ...]:
+        """
+        Of the sets, c of them.
+        """
+class JointCost:
+    """
+    A smooth cost of joint positions, with its derivatives.
+    """
+    def model(self, q: numpy.typing.ArrayLike) -> tuple[float, numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
+        """
+        Cost, gradient (n,) and Hessian (n, n) at q (n,).
+        """
+    def value(self, q: numpy.typing.ArrayLike) -> float:
+        """
+        Cost at q (n,).
+        """
+    @property
+    def dof(self) -> int:
+        """
+        Number of joints, n.
+        """
+class TimeOptimalResult:
+    """
+    Answer of TimeOptimal.solve().
+    """
+    def nodes(self, dof: typing.SupportsInt | typing.SupportsIndex) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
+        """
+        q, q̇, q̈ (N, n), or (0, n) where failed.
+        """
+    @property
+    def cost(self) -> float:
+        """
+        The objective.
+        """
+    @property
+    def duration(self) -> float:
+        """
+        [s] t_F = N h.
+        """
+    @property
+    def gap(self) -> float:
+        """
+        Estimate of what is left to gain.
+        """
+    @property
+    def iterations(self) -> int:
+        """
+        Newton steps, of all starts.
+        """
+    @property
+    def starts(self) -> int:
+        """
+        First guesses tried.
+        """
+    @property
+    def status(self) -> str:
+        """
+        'optimal', 'feasible' (within all constraints, but there is something to gain) or 'failed'.
+        """
+class TimeOptimal:
+    """
+    Time-optimal motions of one arm with one cost, after Beck et al. (2022), by an interior-point
+    method made for double integrators. `sigmaik.planning.time_optimal` is what to call.
+    """
+    def __init__(self, chain: Chain, cost: JointCost | None, *, nodes: typing.SupportsInt | typing.SupportsIndex = 30, time_weight: typing.SupportsFloat | typing.SupportsIndex = 1.0, effort_weight: typing.SupportsFloat | typing.SupportsIndex = 1.0, tolerance: typing.SupportsFloat | typing.SupportsIndex = 1e-09, max_iterations: typing.SupportsInt | typing.SupportsIndex = 200, restarts: bool = True) -> None:
+        """
+        Raises Error where an option is out of its range.
+        """
+    def solve(self, start: numpy.typing.ArrayLike, goal: numpy.typing.ArrayLike, start_velocity: numpy.typing.ArrayLike | None = None, goal_velocity: numpy.typing.ArrayLike | None = None, bend: numpy.typing.ArrayLike | None = None) -> TimeOptimalResult:
+        """
+        A motion between (n,) positions and velocities; `bend` (n,) is added to the first guess half-way.
+
+        Raises Error where an end is outside its limits. One call at a time for each object.
+        """
+def evaluate_index(chain: Chain, q: numpy.typing.ArrayLike, index: str, k: numpy.typing.ArrayLike = 6.0, length_scale: typing.SupportsFloat | typing.SupportsIndex = 1.0, threads: typing.SupportsInt | typing.SupportsIndex = 1) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
+    """
+    Values () or (B,) and gradients (n,) or (B, n) at q (n,) or (B, n).
+    """
+def index_of_jacobian(J: numpy.typing.ArrayLike, index: str, k: numpy.typing.ArrayLike = 6.0, length_scale: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> float | numpy.typing.NDArray[numpy.float64]:
+    """
+    An index of J (m, n), or (B,) of J (B, m, n).
+    """
+def known_singular_sets() -> tuple[str, ...]:
+    ...
 def least_squares(A: numpy.typing.ArrayLike | None = None, b: numpy.typing.ArrayLike | None = None, *, C: numpy.typing.ArrayLike | None = None, d: numpy.typing.ArrayLike | None = None, lower: numpy.typing.ArrayLike | None = None, upper: numpy.typing.ArrayLike | None = None, G: numpy.typing.ArrayLike | None = None, h: numpy.typing.ArrayLike | None = None) -> LeastSquaresSolution:
     """
     min |A x − b|² where C x = d, lower ≤ x ≤ upper, G x ≤ h; of these the shortest x.
@@ -800,12 +966,33 @@ def least_squares(A: numpy.typing.ArrayLike | None = None, b: numpy.typing.Array
 
     There is always an answer: the bounds hold, then G x ≤ h as well as possible, then C x = d, then A x ≈ b.
     """
+def load_singular_sets(name: str) -> SingularSets:
+    ...
+@typing.overload
+def manipulability_cost(sets: SingularSets, weight: typing.SupportsFloat | typing.SupportsIndex, epsilon: typing.SupportsFloat | typing.SupportsIndex) -> JointCost:
+    """
+    weight/(m(q) + ε), m in closed form.
+    """
+@typing.overload
+def manipulability_cost(chain: Chain, weight: typing.SupportsFloat | typing.SupportsIndex, epsilon: typing.SupportsFloat | typing.SupportsIndex) -> JointCost:
+    """
+    weight/(m(q) + ε), m from the Jacobian.
+    """
 def pose_error(current: typing.Any, target: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
     """
     [e_p; e_o] (6,) that takes `current` to `target` (4×4 poses in one frame).
 
     e_p [m] is the difference of the origins, e_o [rad] the axis-angle vector of R_target R_currentᵀ, both in the
     axes of that frame. Right up to and at a half turn.
+    """
+def potential_cost(sets: SingularSets, weight: typing.SupportsFloat | typing.SupportsIndex, eta1: typing.SupportsFloat | typing.SupportsIndex, eta2: typing.SupportsFloat | typing.SupportsIndex) -> JointCost:
+    """
+    weight · Σ_i exp(η₁ − η₂ ψ_i(q)).
+    """
+def reference_scale(chain: Chain, length_scale: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> float:
+    """
+    k of a chain: 6 where the largest eigenvalue of JJᵀ over its joint ranges stays below that by a tenth, else 1.1
+    times that eigenvalue, so that the sphere kI holds every ellipsoid. The same on every machine; takes a few ms.
     """
 def rotation_exp(vector: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
     """
@@ -815,6 +1002,8 @@ def rotation_log(rotation: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy
     """
     Axis times angle [rad] (3,) of a 3×3 rotation, angle in [0, π].
     """
+def singular_sets_of(chain: Chain) -> SingularSets | None:
+    ...
 def solve_batch(method: PseudoInverse | DampedLeastSquares | AdaptiveDampedLeastSquares | SelectivelyDampedLeastSquares | JParse | JacobianProjection | JacobianSafety | JacobianSafetyProjection, J: numpy.typing.ArrayLike, twist: numpy.typing.ArrayLike, length_scale: typing.SupportsFloat | typing.SupportsIndex = 1.0, threads: typing.SupportsInt | typing.SupportsIndex = 1) -> numpy.typing.NDArray[numpy.float64]:
     """
     Joint velocities (B, n) for B independent problems, J (B, m, n) and twist (B, m), without the GIL.
@@ -822,4 +1011,5 @@ def solve_batch(method: PseudoInverse | DampedLeastSquares | AdaptiveDampedLeast
     Each is solved as by a fresh VelocitySolver, so order and number of threads do not change the answers.
     Raises Error where a shape is wrong or an entry is not finite.
     """
+DEFAULT_SCALE: float = 6.0
 __version__: str

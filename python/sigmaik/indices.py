@@ -40,17 +40,17 @@ DEFAULT_SCALE: float = _core.DEFAULT_SCALE
 
 def manipulability(J: ArrayLike, length_scale: float = 1.0) -> float | Array:  # noqa: N803
     """√det(JJᵀ) = Π σ_i (Yoshikawa 1985); 0 at a singularity."""
-    return _core.index_of_jacobian(J, "manipulability", length_scale=length_scale)  # type: ignore[no-any-return]
+    return _core.index_of_jacobian(J, "manipulability", length_scale=length_scale)
 
 
 def condition_number(J: ArrayLike, length_scale: float = 1.0) -> float | Array:  # noqa: N803
     """σ_1/σ_m ≥ 1 (the dexterity index of Petrović et al., eq. 5); inf at a singularity."""
-    return _core.index_of_jacobian(J, "condition_number", length_scale=length_scale)  # type: ignore[no-any-return]
+    return _core.index_of_jacobian(J, "condition_number", length_scale=length_scale)
 
 
 def min_singular_value(J: ArrayLike, length_scale: float = 1.0) -> float | Array:  # noqa: N803
     """σ_m; 0 at a singularity."""
-    return _core.index_of_jacobian(J, "min_singular_value", length_scale=length_scale)  # type: ignore[no-any-return]
+    return _core.index_of_jacobian(J, "min_singular_value", length_scale=length_scale)
 
 
 def geometry_aware(
@@ -65,7 +65,7 @@ def geometry_aware(
     arm of a metre's reach; `reference_scale` finds the k of any chain.
     """
     k = DEFAULT_SCALE if k is None else k
-    return _core.index_of_jacobian(J, "geometry_aware", k, length_scale)  # type: ignore[no-any-return]
+    return _core.index_of_jacobian(J, "geometry_aware", k, length_scale)
 
 
 def evaluate(

@@ -7,7 +7,7 @@ import math
 import threading
 import time
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -153,8 +153,8 @@ def time_optimal(
     return _other_sides(plan, chain, sets, objective, solver, ends)
 
 
-Ends = tuple[ArrayLike, ArrayLike, ArrayLike | None, ArrayLike | None]
-Sets = singularities.SingularSets | None
+Ends: TypeAlias = tuple[ArrayLike, ArrayLike, ArrayLike | None, ArrayLike | None]
+Sets: TypeAlias = singularities.SingularSets | None
 
 
 def _solve(
@@ -179,7 +179,7 @@ def _solve(
         return Trajectory(
             np.empty(0), empty, empty, empty, math.nan, status, math.nan, solve_time, iterations, starts
         )
-    t = np.arange(len(q)) * (duration / len(q))
+    t = np.arange(len(q), dtype=np.float64) * (duration / len(q))
     plan = Trajectory(t, q, qdot, qddot, duration, status, cost, solve_time, iterations, starts)
     dense = np.linspace(0.0, t[-1], DENSE * (len(t) - 1) + 1)
     return replace(plan, clearance=clearance(chain, sets, dense, plan.sample(dense)[0], width=objective.eta2))
@@ -259,8 +259,8 @@ def _other_side(sets: singularities.SingularSets, crossing: Crossing, start: Arr
     else:
         here = sets.signed_residuals(crossing.q)[at]
         aim = -here if np.linalg.norm(here) > 1e-9 else np.eye(sets.codimensions[i])[0]
-    direction = np.linalg.pinv(slope) @ aim
-    length = np.linalg.norm(direction)
+    direction: Array = np.asarray(np.linalg.pinv(slope) @ aim, dtype=np.float64)
+    length = float(np.linalg.norm(direction))
     return direction / length if length > 0.0 else direction
 
 

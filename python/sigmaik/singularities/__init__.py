@@ -35,7 +35,7 @@ __all__ = [
 
 def names() -> tuple[str, ...]:
     """Names of the shipped arms whose singular sets are known."""
-    return _core.known_singular_sets()  # type: ignore[no-any-return]
+    return _core.known_singular_sets()
 
 
 def load(name: str) -> SingularSets:

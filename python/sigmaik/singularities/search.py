@@ -98,14 +98,15 @@ def singular_configurations(chain: Chain, starts: int = 2000, seed: int = 0) -> 
         q = np.where(better[:, None], q_new, q)
         u = np.where(better[:, None], u_new, u)
         residual = np.where(better[:, None], new, residual)
-        damping = np.clip(np.where(better, 0.1 * damping, 10.0 * damping), 1e-20, 1e6)
+        damping = np.clip(np.where(better, 0.1 * damping, 10.0 * damping), 1e-12, 1e6)
     sigma = np.linalg.svd(chain.jacobian(q), compute_uv=False)
     return q[sigma[:, -1] < SINGULAR * sigma[:, 0]]
 
 
 def _lost(jacobian: Array, u: Array) -> Array:
     """Jᵀu (B, n)."""
-    return np.einsum("bij,bi->bj", jacobian, u)
+    lost: Array = np.einsum("bij,bi->bj", jacobian, u)
+    return lost
 
 
 def _classify(chain: Chain, q: Array) -> list[tuple[int, tuple[int, ...]] | None]:
