@@ -77,15 +77,17 @@ void bind_planning(py::module_& m) {
                           "Time-optimal motions of one arm with one cost, after Beck et al. (2022), by an interior-point\n"
                           "method made for double integrators. `sigmaik.planning.time_optimal` is what to call.")
       .def(py::init([](const Chain& chain, const std::optional<std::shared_ptr<JointCost>>& cost, int node_count, double time_weight,
-                       double effort_weight, double tolerance, int max_iterations, bool restarts) {
+                       double effort_weight, double tolerance, int max_iterations, bool between_nodes, bool restarts) {
              return TimeOptimal(chain, cost.value_or(nullptr),
-                                {node_count, time_weight, effort_weight, tolerance, max_iterations, restarts});
+                                {node_count, time_weight, effort_weight, tolerance, max_iterations, between_nodes,
+                                 restarts});
            }),
            py::arg("chain"), py::arg("cost"), py::kw_only(), py::arg("nodes") = TimeOptimalOptions{}.nodes,
            py::arg("time_weight") = TimeOptimalOptions{}.time_weight,
            py::arg("effort_weight") = TimeOptimalOptions{}.effort_weight,
            py::arg("tolerance") = TimeOptimalOptions{}.tolerance,
            py::arg("max_iterations") = TimeOptimalOptions{}.max_iterations,
+           py::arg("between_nodes") = TimeOptimalOptions{}.between_nodes,
            py::arg("restarts") = TimeOptimalOptions{}.restarts,
            "Raises Error where an option is out of its range.")
       .def(

@@ -937,7 +937,7 @@ class TimeOptimal:
     Time-optimal motions of one arm with one cost, after Beck et al. (2022), by an interior-point
     method made for double integrators. `sigmaik.planning.time_optimal` is what to call.
     """
-    def __init__(self, chain: Chain, cost: JointCost | None, *, nodes: typing.SupportsInt | typing.SupportsIndex = 30, time_weight: typing.SupportsFloat | typing.SupportsIndex = 1.0, effort_weight: typing.SupportsFloat | typing.SupportsIndex = 1.0, tolerance: typing.SupportsFloat | typing.SupportsIndex = 1e-09, max_iterations: typing.SupportsInt | typing.SupportsIndex = 200, restarts: bool = True) -> None:
+    def __init__(self, chain: Chain, cost: JointCost | None, *, nodes: typing.SupportsInt | typing.SupportsIndex = 30, time_weight: typing.SupportsFloat | typing.SupportsIndex = 1.0, effort_weight: typing.SupportsFloat | typing.SupportsIndex = 1.0, tolerance: typing.SupportsFloat | typing.SupportsIndex = 1e-09, max_iterations: typing.SupportsInt | typing.SupportsIndex = 200, between_nodes: bool = True, restarts: bool = True) -> None:
         """
         Raises Error where an option is out of its range.
         """

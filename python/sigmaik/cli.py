@@ -1,4 +1,4 @@
-"""The command `sigmaik`: reach, limits and axis5 (experiments), robots, info.
+"""The command `sigmaik`: reach, limits, axis5 and montecarlo (experiments), robots, info.
 
 Everything that is asked of a file or an option and is wrong there ends with one line on stderr and exit code
 2.
@@ -7,7 +7,6 @@ Everything that is asked of a file or an option and is wrong there ends with one
 from __future__ import annotations
 
 import argparse
-import importlib.util
 import math
 import os
 import pathlib
@@ -22,6 +21,8 @@ from numpy.typing import NDArray
 import sigmaik as sk
 
 from . import experiments as ex
+from .cli_montecarlo import add_montecarlo
+from .console import MissingPackage, need, terminal
 from .experiments import axis5
 from .experiments.reach import load_arm
 
@@ -33,10 +34,6 @@ __all__ = ["main"]
 Array = NDArray[np.float64]
 
 
-class _Missing(Exception):
-    """A package of an extra is not installed."""
-
-
 def main(argv: Sequence[str] | None = None) -> int:
     """Runs the command. Returns the exit code: 0, 2 for wrong input, 130 when interrupted."""
     arguments = _parser().parse_args(argv)
@@ -44,7 +41,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         result: int = arguments.run(arguments)
         sys.stdout.flush()
         return result
-    except (ValueError, OSError, _Missing) as error:
+    except (ValueError, OSError, MissingPackage) as error:
         if isinstance(error, BrokenPipeError):  # `sigmaik robots | head -1`
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             return 0
@@ -65,6 +62,9 @@ def _parser() -> argparse.ArgumentParser:
     )
     _add_axis5(commands.add_parser("axis5", help="drive a KUKA arm by its axis-5 singularity, within limits"))
     _add_limits(commands.add_parser("limits", help="what joint limits cost, and what breaks without them"))
+    add_montecarlo(
+        commands.add_parser("montecarlo", help="random motions, clear of singularities or not: what it costs and brings")
+    )
     robots = commands.add_parser("robots", help="list the arms that are shipped, and their paths")
     robots.set_defaults(run=_robots)
     _add_info(commands.add_parser("info", help="an arm's joints, limits, reach and singular values"))
@@ -143,9 +143,9 @@ def _add_reach(parser: argparse.ArgumentParser) -> None:
 
 
 def _reach(arguments: argparse.Namespace) -> int:
-    console = _console()
+    console = terminal()
     if not arguments.no_plot:
-        _need("matplotlib")
+        need("matplotlib")
     # Parsed before anything runs, so that a wrong option is told at once.
     changes = {
         name: getattr(arguments, name)
@@ -289,9 +289,9 @@ def _add_axis5(parser: argparse.ArgumentParser) -> None:
 
 
 def _axis5(arguments: argparse.Namespace) -> int:
-    console = _console()
+    console = terminal()
     if not arguments.no_plots:
-        _need("matplotlib")
+        need("matplotlib")
     offset = None if arguments.offset is None else math.radians(arguments.offset)
     motion = axis5.motion(arguments.example, arguments.distance, arguments.duration, offset)
     changes = {name: getattr(arguments, name) for name in ("dt", "beta", "gamma", "iterations")}
@@ -372,9 +372,9 @@ def _add_limits(parser: argparse.ArgumentParser) -> None:
 
 
 def _run_limits(arguments: argparse.Namespace) -> int:
-    console = _console()
+    console = terminal()
     if not arguments.no_plot:
-        _need("matplotlib")
+        need("matplotlib")
     names = ("seed", "rate", "trials", "seconds", "pace", "acceleration", "jerk")
     settings = ex.LimitsSettings(**{name: getattr(arguments, name) for name in names})
     experiment = ex.load_limits(
@@ -439,7 +439,7 @@ def _run_limits(arguments: argparse.Namespace) -> int:
 
 
 def _robots(_: argparse.Namespace) -> int:
-    console = _console()
+    console = terminal()
     from rich import box
     from rich.table import Table
 
@@ -472,7 +472,7 @@ def _add_info(parser: argparse.ArgumentParser) -> None:
 
 
 def _info(arguments: argparse.Namespace) -> int:
-    console = _console()
+    console = terminal()
     from rich import box
     from rich.table import Table
 
@@ -511,7 +511,35 @@ def _info(arguments: argparse.Namespace) -> int:
     ratio = sigma[-1] / sigma[0] if sigma[0] > 0.0 else 0.0
     console.print("singular values: " + " ".join(f"{s:.4g}" for s in sigma), highlight=False)
     console.print(f"σ_min/σ_max: {ratio:.4g}", highlight=False)
+    m, xi = (float(sk.indices.evaluate(chain, q, index)) for index in ("manipulability", "geometry_aware"))
+    console.print(
+        f"manipulability: {m:.4g}, condition number: {sk.indices.condition_number(chain.jacobian(q)):.4g}, "
+        f"geometry-aware index: {xi:.4g} (k = {sk.indices.reference_scale(chain):.3g})",
+        highlight=False,
+    )
+    _singular_sets(console, chain, q)
     return 0
+
+
+def _singular_sets(console: Console, chain: sk.Chain, q: Array) -> None:
+    sets = sk.singularities.of(chain)
+    if sets is None:
+        console.print("\nsingular sets: not known; sk.singularities.find searches for them", highlight=False)
+        return
+    from rich import box
+    from rich.table import Table
+
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0))
+    for head in ("singular set", "where"):
+        table.add_column(head)
+    for head in ("codim.", "√ψ here"):
+        table.add_column(head, justify="right")
+    described = zip(sets.names, sets.conditions, sets.codimensions, sets.residuals(q), strict=True)
+    for name, condition, codimension, psi in described:
+        table.add_row(name, condition, str(codimension), f"{math.sqrt(psi):.3f}")
+    console.print()
+    console.print(table)
+    console.print("codimension 1: a wall; 2: there is a way round. √ψ: about the distance, in rad", highlight=False)
 
 
 def _sampled_reach(chain: sk.Chain, samples: int, seed: int) -> float:
@@ -545,18 +573,6 @@ def _reach_bound(text: str, chain: sk.Chain) -> float:
 
 
 # --- helpers
-
-
-def _console() -> Console:
-    _need("rich")
-    from rich.console import Console
-
-    return Console(soft_wrap=False)
-
-
-def _need(package: str) -> None:
-    if importlib.util.find_spec(package) is None:
-        raise _Missing(f"{package} is not installed; pip install 'sigmaik[demo]' brings it")
 
 
 def _configuration(option: str, text: str, chain: sk.Chain, home: Array) -> Array:

@@ -92,6 +92,10 @@ double violation(const Chain& chain, const TimeOptimalProblem& problem, const Ti
     if (k + 1 == nodes) break;
     take((q + h * v + 0.5 * h * h * a - row(r.q, k + 1)).cwiseAbs());
     take((v + h * a - row(r.qdot, k + 1)).cwiseAbs());
+    for (double t = 0.05 * h; t < h; t += 0.05 * h) {
+      take(l.lower - (q + t * v + 0.5 * t * t * a));
+      take((q + t * v + 0.5 * t * t * a) - l.upper);
+    }
   }
   const JointVector rest = JointVector::Zero(n);
   take((row(r.q, 0) - problem.start).cwiseAbs());
@@ -150,6 +154,16 @@ Kkt stationarity(const Chain& chain, const TimeOptimalResult& r, const TimeOptim
         if (l.upper[i] - q < tolerance) one_sided.push_back(-dq);
         if (l.velocity[i] + v < tolerance) one_sided.push_back(dv);
         if (l.velocity[i] - v < tolerance) one_sided.push_back(-dv);
+      }
+      // The point between: of the first step it moves with h alone, of the last one the other way.
+      const double end_velocity = at(r.qdot, nodes - 1, i);
+      Eigen::VectorXd between = dq + 0.5 * h * dv;
+      between[0] += 0.5 * v;
+      const double middle = q + 0.5 * h * v;
+      if (k < nodes - 1 && (k > 0 || v != 0.0)) {
+        const bool last = k == nodes - 2;
+        if (middle - l.lower[i] < tolerance && !(last && !(end_velocity > 0.0))) one_sided.push_back(between);
+        if (l.upper[i] - middle < tolerance && !(last && !(end_velocity < 0.0))) one_sided.push_back(-between);
       }
       if (k < nodes - 1) {
         gradient[index(k, i)] += 2.0 * options.effort_weight * a;

@@ -19,8 +19,9 @@
 namespace sigmaik::planning::detail {
 
 // Constraints come in six families, one number a joint and node each:
-// q − lower, upper − q, hV + p, hV − p, h²A + a, h²A − a ≥ 0.
-enum Family { kLower, kUpper, kBackward, kForward, kBrake, kPush, kFamilies };
+// q − lower, upper − q, hV + p, hV − p, h²A + a, h²A − a ≥ 0; and, where the positions between the nodes are to keep their
+// limits too, q + p/2 − lower, upper − q − p/2 ≥ 0: a step's parabola stays in the hull of its ends and that point.
+enum Family { kLower, kUpper, kBackward, kForward, kBrake, kPush, kLowerBetween, kUpperBetween, kFamilies };
 
 // What a node holds besides its stage's model.
 template <int W>
@@ -64,8 +65,14 @@ class InteriorPoint final : public TimeOptimal::Engine {
   static constexpr double kKick = 0.02;  // [rad or m]
   static constexpr int kKicks = 3;
 
-  // Whether node k has the constraints of a family: ends cannot move, and the last acceleration is none.
-  bool has(int family, int k) const noexcept { return k <= count_ - 2 && (k >= 1 || family >= kBrake); }
+  // 1 for each joint with a constraint of that family at node k, else 0. Ends cannot move, and the last acceleration is
+  // none. The points between of the first and last step are q_0 + h q̇_0/2 and q_{N−1} − h q̇_{N−1}/2.
+  const Row<W>& active(int family, int k) const noexcept {
+    if (k == 0 && family < kBrake) return none_;
+    if (family >= kLowerBetween && k == 0) return leaves_[family - kLowerBetween];
+    if (family >= kLowerBetween && k == count_ - 2) return arrives_[family - kLowerBetween];
+    return active_[family];
+  }
 
   void guess(const TimeOptimalProblem& problem);
   double bend_acceleration(int k) const noexcept;
@@ -82,6 +89,7 @@ class InteriorPoint final : public TimeOptimal::Engine {
   double merit(double alpha, double mu, double penalty) const noexcept;
   bool search_line(double mu, double penalty, double gain, double& alpha) const noexcept;
   void advance(double primal, double dual, double mu) noexcept;
+  void count_constraints() noexcept;
   void start_barrier(double mu) noexcept;
   double penalty() const noexcept;
   double motion_cost() const noexcept;
@@ -97,12 +105,13 @@ class InteriorPoint final : public TimeOptimal::Engine {
   TimeOptimalOptions options_;
   Row<W> lower_{}, upper_{}, velocity_{}, acceleration_{};
   Row<W> active_[kFamilies]{};  // 1 where there is a limit, else 0
+  Row<W> none_{}, leaves_[2]{}, arrives_[2]{};
   Row<W> start_{}, end_{};      // velocities at the ends
   std::vector<Stage<W>> stages_;
   std::vector<Node<W>> nodes_;
   double end_cost_ = 0.0;       // of the two nodes that cannot move
   double h_ = 1.0, dh_ = 0.0, h_dual_ = 0.0;
-  double constraints_ = 1.0;    // how many; one for h > 0
+  double constraints_ = 1.0;    // how many
   bool feasible_ = true;
   bool bent_ = false;           // the model had no minimum in the step: one was made up
   mutable JointVector joints_, joint_gradient_;
@@ -122,17 +131,12 @@ InteriorPoint<W>::InteriorPoint(const Chain& chain, const JointCostPtr& cost, co
       row[i] = finite ? value : padding;
       for (const int f : families) active_[f][i] = finite ? 1.0 : 0.0;
     };
-    take(lower_, joint ? limits.lower[i] : 0.0, 0.0, {kLower});
-    take(upper_, joint ? limits.upper[i] : 0.0, 0.0, {kUpper});
+    take(lower_, joint ? limits.lower[i] : 0.0, 0.0, {kLower, kLowerBetween});
+    take(upper_, joint ? limits.upper[i] : 0.0, 0.0, {kUpper, kUpperBetween});
     take(velocity_, joint ? limits.velocity[i] : 0.0, 0.0, {kBackward, kForward});
     take(acceleration_, joint ? limits.acceleration[i] : 0.0, 0.0, {kBrake, kPush});
   }
-  for (int k = 0; k < count_; ++k) {
-    for (int f = 0; f < kFamilies; ++f) {
-      if (!has(f, k)) continue;
-      for (int i = 0; i < n_; ++i) constraints_ += active_[f][i];
-    }
-  }
+  if (!options.between_nodes) active_[kLowerBetween] = active_[kUpperBetween] = none_;
   joints_.resize(n_);
   joint_gradient_.resize(n_);
   joint_hessian_.resize(n_, n_);
@@ -147,7 +151,9 @@ double InteriorPoint<W>::constraint(const Node<W>& x, int family, int i) const n
     case kBackward: return h_ * velocity_[i] + x.p[i];
     case kForward: return h_ * velocity_[i] - x.p[i];
     case kBrake: return h_ * h_ * acceleration_[i] + x.a[i];
-    default: return h_ * h_ * acceleration_[i] - x.a[i];
+    case kPush: return h_ * h_ * acceleration_[i] - x.a[i];
+    case kLowerBetween: return x.q[i] + 0.5 * x.p[i] - lower_[i];
+    default: return upper_[i] - x.q[i] - 0.5 * x.p[i];
   }
 }
 
@@ -304,21 +310,24 @@ void InteriorPoint<W>::assemble(double mu, bool convex) noexcept {
     Node<W>& x = node(k);
     Stage<W>& s = stage(k);
     for (int f = 0; f < kFamilies; ++f) {
-      const bool on = has(f, k);
+      const Row<W>& on = active(f, k);
       for (int i = 0; i < W; ++i) {
         const double inverse = 1.0 / x.slack[f][i];
-        x.weight[f][i] = on ? x.dual[f][i] * inverse : 0.0;
-        x.force[f][i] = on ? active_[f][i] * (mu * inverse) - x.weight[f][i] * x.miss[f][i] : 0.0;
+        x.weight[f][i] = x.dual[f][i] * inverse;
+        x.force[f][i] = on[i] * (mu * inverse) - x.weight[f][i] * x.miss[f][i];
       }
     }
     s.qq = convex ? x.convex : x.hessian;
     for (int i = 0; i < W; ++i) {
       const double a = 2.0 * h_ * acceleration_[i];
-      s.qq.at[i][i] += x.weight[kLower][i] + x.weight[kUpper][i];
-      s.gq[i] = x.gradient[i] + x.force[kUpper][i] - x.force[kLower][i];
-      s.pp[i] = x.weight[kBackward][i] + x.weight[kForward][i];
+      const double between = x.weight[kLowerBetween][i] + x.weight[kUpperBetween][i];
+      const double inward = x.force[kUpperBetween][i] - x.force[kLowerBetween][i];
+      s.qq.at[i][i] += x.weight[kLower][i] + x.weight[kUpper][i] + between;
+      s.gq[i] = x.gradient[i] + x.force[kUpper][i] - x.force[kLower][i] + inward;
+      s.qp[i] = 0.5 * between;
+      s.pp[i] = x.weight[kBackward][i] + x.weight[kForward][i] + 0.25 * between;
       s.ph[i] = velocity_[i] * (x.weight[kBackward][i] - x.weight[kForward][i]);
-      s.gp[i] = x.force[kForward][i] - x.force[kBackward][i];
+      s.gp[i] = x.force[kForward][i] - x.force[kBackward][i] + 0.5 * inward;
       s.aa[i] = effort + x.weight[kBrake][i] + x.weight[kPush][i];
       s.ah[i] = -4.0 * effort / h_ * x.a[i] + a * (x.weight[kBrake][i] - x.weight[kPush][i]);
       s.ga[i] = effort * x.a[i] + x.force[kPush][i] - x.force[kBrake][i];
@@ -339,10 +348,12 @@ void InteriorPoint<W>::slack_changes(int k, const Row<W>& dq, const Row<W>& dp, 
     out[kForward][i] = v - dp[i];
     out[kBrake][i] = a + da[i];
     out[kPush][i] = a - da[i];
+    out[kLowerBetween][i] = dq[i] + 0.5 * dp[i];
+    out[kUpperBetween][i] = -dq[i] - 0.5 * dp[i];
   }
   for (int f = 0; f < kFamilies; ++f) {
-    const double on = has(f, k) ? 1.0 : 0.0;
-    for (int i = 0; i < W; ++i) out[f][i] *= on * active_[f][i];
+    const Row<W>& on = active(f, k);
+    for (int i = 0; i < W; ++i) out[f][i] *= on[i];
   }
 }
 
@@ -421,7 +432,6 @@ double InteriorPoint<W>::slope(double mu, double penalty) const noexcept {
     sum += 2.0 * we * h4 * dot_rows(x.a, x.da);
     if (k >= 1) sum += dot_rows(x.gradient, x.dq);
     for (int f = 0; f < kFamilies; ++f) {
-      if (!has(f, k)) continue;
       double part = 0.0;
       for (int i = 0; i < W; ++i) part += x.dslack[f][i] / x.slack[f][i];
       sum -= mu * part;
@@ -442,12 +452,12 @@ void InteriorPoint<W>::step_lengths(double mu, double& primal, double& dual) noe
   for (int k = 0; k < count_ - 1; ++k) {
     Node<W>& x = node(k);
     for (int f = 0; f < kFamilies; ++f) {
-      if (!has(f, k)) continue;
+      const Row<W>& on = active(f, k);
       Row<W> p, d;
       for (int i = 0; i < W; ++i) {
         const double inverse = 1.0 / x.slack[f][i];
         const double ratio = x.dslack[f][i] * inverse;
-        x.ddual[f][i] = active_[f][i] * (mu * inverse) - x.dual[f][i] - x.dual[f][i] * ratio;
+        x.ddual[f][i] = on[i] * (mu * inverse) - x.dual[f][i] - x.dual[f][i] * ratio;
         p[i] = -ratio;
         d[i] = -x.ddual[f][i] / (x.dual[f][i] + 1e-300);
       }
@@ -486,12 +496,12 @@ double InteriorPoint<W>::merit(double alpha, double mu, double penalty) const no
     }
     effort += dot_rows(a, a);
     for (int f = 0; f < kFamilies; ++f) {
-      if (!has(f, k)) continue;
+      const Row<W>& on = active(f, k);
+      const bool curved = f == kBrake || f == kPush;
       for (int i = 0; i < W; ++i) {
-        const double linear = x.slack[f][i] + alpha * x.dslack[f][i];
-        double slack = linear;
-        if (f >= kBrake && x.miss[f][i] == 0.0) slack += acceleration_[i] * alpha * alpha * dh_ * dh_;
-        slack = active_[f][i] > 0.0 ? slack : 1.0;
+        double slack = x.slack[f][i] + alpha * x.dslack[f][i];
+        if (curved && x.miss[f][i] == 0.0) slack += acceleration_[i] * alpha * alpha * dh_ * dh_;
+        slack = on[i] > 0.0 ? slack : 1.0;
         least = std::min(least, slack - (1.0 - kToBoundary) * x.slack[f][i]);
         product[i] *= slack;
         missed += (1.0 - alpha) * std::abs(x.miss[f][i]);
@@ -524,9 +534,9 @@ void InteriorPoint<W>::advance(double primal, double dual, double mu) noexcept {
       x.a[i] += primal * x.da[i];
     }
     for (int f = 0; f < kFamilies; ++f) {
-      if (!has(f, k)) continue;
+      const Row<W>& on = active(f, k);
       for (int i = 0; i < W; ++i) {
-        if (!(active_[f][i] > 0.0)) continue;
+        if (!(on[i] > 0.0)) continue;
         const double value = constraint(x, f, i);
         double& slack = x.slack[f][i];
         slack += primal * x.dslack[f][i];
@@ -567,6 +577,23 @@ TimeOptimalResult InteriorPoint<W>::result(int iterations, double gap, bool opti
   return out;
 }
 
+// Which ends leave and arrive so that the step's point between could be outside, and how many constraints there are.
+template <int W>
+void InteriorPoint<W>::count_constraints() noexcept {
+  for (int i = 0; i < W; ++i) {
+    leaves_[0][i] = start_[i] < 0.0 ? active_[kLowerBetween][i] : 0.0;
+    leaves_[1][i] = start_[i] > 0.0 ? active_[kUpperBetween][i] : 0.0;
+    arrives_[0][i] = end_[i] > 0.0 ? active_[kLowerBetween][i] : 0.0;
+    arrives_[1][i] = end_[i] < 0.0 ? active_[kUpperBetween][i] : 0.0;
+  }
+  constraints_ = 1.0;  // h > 0
+  for (int k = 0; k < count_ - 1; ++k) {
+    for (int f = 0; f < kFamilies; ++f) {
+      for (int i = 0; i < W; ++i) constraints_ += active(f, k)[i];
+    }
+  }
+}
+
 // Slacks and multipliers of the first guess, on the central path of `mu` where the guess keeps the limits.
 template <int W>
 void InteriorPoint<W>::start_barrier(double mu) noexcept {
@@ -577,8 +604,10 @@ void InteriorPoint<W>::start_barrier(double mu) noexcept {
       for (int i = 0; i < W; ++i) {
         x.slack[f][i] = 1.0;
         x.dual[f][i] = x.miss[f][i] = x.dslack[f][i] = x.ddual[f][i] = 0.0;
-        if (!has(f, k) || !(active_[f][i] > 0.0)) continue;
-        const double scale = f <= kUpper ? 1.0 : f <= kForward ? h_ * velocity_[i] : h_ * h_ * acceleration_[i];
+        if (!(active(f, k)[i] > 0.0)) continue;
+        const double scale = f == kBackward || f == kForward ? h_ * velocity_[i]
+                             : f == kBrake || f == kPush     ? h_ * h_ * acceleration_[i]
+                                                             : 1.0;
         const double value = constraint(x, f, i);
         x.slack[f][i] = std::max(value, kLeastSlack * scale);
         x.miss[f][i] = value - x.slack[f][i];
@@ -607,6 +636,7 @@ TimeOptimalResult InteriorPoint<W>::solve(const TimeOptimalProblem& problem) {
   guess(problem);
   end_cost_ = cost_ ? cost_->value(problem.start) + cost_->value(problem.goal) : 0.0;
   evaluate();
+  count_constraints();
   double mu = motion_cost() / constraints_;
   start_barrier(mu);
 

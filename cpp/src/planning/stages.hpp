@@ -43,7 +43,7 @@ struct alignas(64) Square {
 template <int W>
 struct Stage {
   Square<W> qq;             // Hessian in q: dense, as costs couple the joints
-  Row<W> pp, aa;            // diagonals: limits and effort see one joint each
+  Row<W> pp, qp, aa;        // diagonals: limits and effort see one joint each
   Row<W> ph, ah;            // with the step
   Row<W> gq, gp, ga;        // gradient
   Square<W> factor;         // Lᵀ (row j is column j of L) of R + BᵀPB = L Lᵀ; its diagonal inverted
@@ -119,9 +119,9 @@ struct Recursion {
         (0.125 * h).store(vqp.at[j]);
         (0.0625 * h).store(vpp.at[j]);
         const double last = s2.pp[j] + s2.aa[j];
-        vqq.at[j][j] += s1.aa[j] + last;
-        vqp.at[j][j] += 1.5 * s1.aa[j] + 0.5 * last;
-        vpp.at[j][j] += s1.pp[j] + 2.25 * s1.aa[j] + 0.25 * last;
+        vqq.at[j][j] += s1.aa[j] + last - s2.qp[j];
+        vqp.at[j][j] += s1.qp[j] + 1.5 * s1.aa[j] + 0.5 * (last - s2.qp[j]);
+        vpp.at[j][j] += s1.pp[j] + 2.25 * s1.aa[j] + 0.25 * (last - s2.qp[j]);
       }
     }
     for (int k = nodes - 4; k >= 0; --k) {
@@ -171,6 +171,7 @@ struct Recursion {
         qq.store(vqq.at[j]);
         qp.store(vqp.at[j]);
         pp.store(vpp.at[j]);
+        vqp.at[j][j] += s.qp[j];
         vpp.at[j][j] += s.pp[j];
       }
     }
@@ -187,13 +188,14 @@ struct Recursion {
     {
       Row<W> q2;
       (-0.25 * e).store(q2.at);
-      Row<W> a1, gp2, ga2;
+      Row<W> a1, gp2, ga2, gq2_end;
       for (int i = 0; i < W; ++i) {
         a1[i] = s1.ah[i] - 0.5 * s1.aa[i] * end[i];
-        gp2[i] = s2.ph[i] - 0.5 * s2.pp[i] * end[i];
+        gp2[i] = s2.ph[i] - (0.5 * s2.pp[i] + 0.25 * s2.qp[i]) * end[i];
+        gq2_end[i] = -0.5 * s2.qp[i] * end[i];
         ga2[i] = s2.ah[i] + 1.5 * s2.aa[i] * end[i];
       }
-      const C gq2[2] = {load(s2.gq), times(s2.qq, q2)};
+      const C gq2[2] = {load(s2.gq), times(s2.qq, q2) + load(gq2_end)};
       const C ga1s[2] = {load(s1.ga), load(a1)};
       const C last[2] = {load(s2.ga) - load(s2.gp), load(ga2) - load(gp2)};
       for (int c = 0; c < 2; ++c) {

@@ -50,6 +50,7 @@ class Objective:
     generic_manipulability: bool
     tolerance: float
     max_iterations: int
+    between_nodes: bool
     restarts: bool
 
 
@@ -71,6 +72,7 @@ def time_optimal(
     goal_velocity: ArrayLike | None = None,
     sets: singularities.SingularSets | None = None,
     generic_manipulability: bool = False,
+    between_nodes: bool = True,
     restarts: bool = True,
     solver: Solver = "sigmaik",
     tolerance: float = 1e-9,
@@ -100,6 +102,9 @@ def time_optimal(
         The arm's singular sets; by default `singularities.of(chain)`. "potential" needs them.
     generic_manipulability
         Take m from the Jacobian though a closed form is known: what an arm without one costs.
+    between_nodes
+        Keep the limits of position between the nodes too, where a parabola can overshoot; False: at the nodes alone, as in
+        the paper. IPOPT's problem is always the paper's.
     restarts
         Where the motion found still leads through what is to be avoided, look on the other sides too.
     solver
@@ -144,6 +149,7 @@ def time_optimal(
         generic_manipulability,
         tolerance,
         max_iterations,
+        between_nodes,
         restarts,
     )
     ends = (start, goal, start_velocity, goal_velocity)
@@ -211,6 +217,7 @@ def _build(chain: Chain, sets: str | None, o: Objective) -> _core.TimeOptimal:
         effort_weight=o.effort_weight,
         tolerance=o.tolerance,
         max_iterations=o.max_iterations,
+        between_nodes=o.between_nodes,
         restarts=o.restarts,
     )
 

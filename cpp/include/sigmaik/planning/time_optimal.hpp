@@ -10,8 +10,9 @@
 ///     (q_0, q̇_0) and (q_{N−1}, q̇_{N−1}) given,   lower ≤ q_k ≤ upper,   |q̇_k| ≤ velocity,   |q̈_k| ≤ acceleration
 ///
 /// As printed in the paper, h is t_F/N where the motion takes N − 1 steps: the last one, of length h, is spent at the
-/// goal. Velocities and positions within their limits at the nodes are so between them too, but for what positions
-/// overshoot where a velocity changes its sign within a step, at most h²/8 times the acceleration.
+/// goal. Limits at the nodes are limits between them for velocities, not for positions: where a velocity changes its sign
+/// within a step, q overshoots by up to h²/8 times the acceleration. So, beyond the paper, q_k + h q̇_k/2 is kept within the
+/// position limits too: a step's parabola stays in the hull of its ends and that point.
 ///
 /// Solved by a primal-dual interior-point method whose every iterate satisfies the dynamics: in p = h q̇ and a = h² q̈ they
 /// do not know h, so that a Newton step is one Riccati recursion with one more column for h. Answers are local minima.
@@ -32,6 +33,7 @@ struct TimeOptimalOptions {
   double effort_weight = 1.0;  ///< [s⁴/rad²] ≥ 0, w_e; > 0 where a joint has no acceleration limit
   double tolerance = 1e-9;     ///< in [1e-12, 1e-2]: what is left to gain, as a part of the objective between the ends
   int max_iterations = 200;    ///< ≥ 1, Newton steps of a start
+  bool between_nodes = true;   ///< positions keep their limits between the nodes too; false: as in the paper
   /// Where the way found still leads through what the cost marks, look on either side of it too, and keep the best.
   bool restarts = true;
 };
