@@ -9,6 +9,13 @@ OnLimit on_limit_argument(const std::string& text) {
   throw Error("on_limit = '" + text + "' must be 'redistribute' or 'scale'");
 }
 
+Avoid avoid_argument(const std::optional<std::string>& text) {
+  if (!text) return Avoid::None;
+  if (*text == "manipulability") return Avoid::Manipulability;
+  if (*text == "potential") return Avoid::Potential;
+  throw Error("avoid = '" + *text + "' must be None, 'manipulability' or 'potential'");
+}
+
 // Python gets an exception where C++ gets a status; the servo keeps its state and holds.
 void require_started(const Servo& servo) {
   if (servo.q().size() == 0) throw Error("the servo has no start: call reset(q) first");
@@ -55,7 +62,8 @@ void bind_servo(py::module_& m) {
                     "the chain's limits and leaves room to go on holding them; a start outside them comes back.")
       .def(py::init([](const Chain& chain, const Method& method, double dt, double gain_linear, double gain_angular,
                        double max_linear_error, double max_angular_error, double soft_start, const MaybeArray& posture,
-                       double posture_gain, double posture_max_speed, bool position_limits, bool velocity_limits,
+                       double posture_gain, double posture_max_speed, const std::optional<std::string>& avoid,
+                       double avoid_gain, double avoid_max_speed, double eta1, double eta2, bool position_limits, bool velocity_limits,
                        bool acceleration_limits, bool jerk_limits, double recovery_speed, const std::string& on_limit,
                        const MaybeArray& exact, double length_scale, const MaybeArray& mask, const std::string& frame) {
              ServoOptions options;
@@ -68,6 +76,11 @@ void bind_servo(py::module_& m) {
              options.posture = optional_joint_argument(object_of(posture), "posture", chain.dof());
              options.posture_gain = posture_gain;
              options.posture_max_speed = posture_max_speed;
+             options.avoid.what = avoid_argument(avoid);
+             options.avoid.gain = avoid_gain;
+             options.avoid.max_speed = avoid_max_speed;
+             options.avoid.potential.eta1 = eta1;
+             options.avoid.potential.eta2 = eta2;
              options.position_limits = position_limits;
              options.velocity_limits = velocity_limits;
              options.acceleration_limits = acceleration_limits;
@@ -85,7 +98,10 @@ void bind_servo(py::module_& m) {
            py::arg("max_angular_error") = ServoOptions{}.max_angular_error,
            py::arg("soft_start") = ServoOptions{}.soft_start, py::arg("posture") = py::none(),
            py::arg("posture_gain") = ServoOptions{}.posture_gain,
-           py::arg("posture_max_speed") = ServoOptions{}.posture_max_speed, py::arg("position_limits") = true,
+           py::arg("posture_max_speed") = ServoOptions{}.posture_max_speed, py::arg("avoid") = py::none(),
+           py::arg("avoid_gain") = AvoidanceOptions{}.gain, py::arg("avoid_max_speed") = AvoidanceOptions{}.max_speed,
+           py::arg("eta1") = AvoidanceOptions{}.potential.eta1, py::arg("eta2") = AvoidanceOptions{}.potential.eta2,
+           py::arg("position_limits") = true,
            py::arg("velocity_limits") = true, py::arg("acceleration_limits") = true, py::arg("jerk_limits") = true,
            py::arg("recovery_speed") = ServoOptions{}.recovery_speed, py::arg("on_limit") = "redistribute",
            py::arg("exact") = py::none(), py::arg("length_scale") = 1.0, py::arg("mask") = py::none(),
@@ -97,6 +113,9 @@ void bind_servo(py::module_& m) {
            "    was told that the arm moves.\n"
            "posture: (n,) nominal positions, by default those given to reset(); posture_gain [1/s];\n"
            "posture_max_speed [rad/s or m/s] caps each joint.\n"
+           "avoid: adds avoid_gain times the gradient of the manipulability ('manipulability'), or minus that of the\n"
+           "    potentials Σ exp(eta1 − eta2 ψ_i) around the known singular sets ('potential'), to the posture's velocity,\n"
+           "    shortened to avoid_max_speed of the fastest joint: a redundant arm keeps away from singularities.\n"
            "position_limits, …: which of the chain's limits are held, now and so that they can be held for ever.\n"
            "recovery_speed: in (0, 1], of the velocity limit, least speed of a joint that starts outside its position\n"
            "    limits on its way back.\n"

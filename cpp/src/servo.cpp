@@ -125,6 +125,7 @@ Servo::Servo(Chain chain, const Method& method, const ServoOptions& options)
       options_(options),
       exact_{options.exact, options.task.frame},
       solver_(method, options.length_scale, options.task),
+      avoidance_(chain_, options.avoid),
       tracker_(chain_.limits(), detail::limit_options(options)) {
   check_finite("gain_linear", options.gain_linear, true, "1/s");
   check_finite("gain_angular", options.gain_angular, true, "1/s");
@@ -160,9 +161,14 @@ void Servo::reset(const JointRef& q, const JointRef& qdot) {
 void Servo::set_method(const Method& method) { solver_.set_method(method); }
 
 JointVector Servo::posture_velocity() const noexcept {
-  if (options_.posture_gain == 0.0) return {};
-  const double cap = options_.posture_max_speed;
-  return (options_.posture_gain * (nominal_ - tracker_.q())).cwiseMax(-cap).cwiseMin(cap);
+  JointVector velocity;
+  if (options_.posture_gain != 0.0) {
+    const double cap = options_.posture_max_speed;
+    velocity = (options_.posture_gain * (nominal_ - tracker_.q())).cwiseMax(-cap).cwiseMin(cap);
+  }
+  if (!avoidance_.active()) return velocity;
+  const JointVector away = avoidance_.velocity(tracker_.q());
+  return velocity.size() == 0 ? away : JointVector(velocity + away);
 }
 
 ServoStep Servo::stop(Status status) noexcept {

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <limits>
 
+#include <sigmaik/avoidance.hpp>
 #include <sigmaik/chain.hpp>
 #include <sigmaik/kinematics.hpp>
 #include <sigmaik/least_squares.hpp>
@@ -43,6 +44,7 @@ struct ServoOptions {
   JointVector posture{};       ///< (n,) nominal positions; empty: the positions given to reset()
   double posture_gain = 0.0;   ///< [1/s] ≥ 0
   double posture_max_speed = std::numeric_limits<double>::infinity();  ///< [rad/s or m/s] > 0, a joint
+  AvoidanceOptions avoid{};  ///< added to the posture's velocity: away from singularities, where the arm is redundant
   bool position_limits = true;  ///< which of the chain's limits are held; see limits.hpp
   bool velocity_limits = true;
   bool acceleration_limits = true;
@@ -121,6 +123,7 @@ class Servo {
   ServoOptions options_;
   Task exact_;
   VelocitySolver solver_;
+  Avoidance avoidance_;
   LimitTracker tracker_;
   LeastSquares least_squares_;
   LeastSquaresProblem problem_;

@@ -16,9 +16,10 @@
 ///     batch.hpp            solve_batch: many at once
 ///     limits.hpp           LimitTracker: position, velocity, acceleration and jerk limits → this cycle's bounds
 ///     least_squares.hpp    LeastSquares: equalities, bounds and inequalities, always with an answer
-///     servo.hpp            Servo: pose or twist in, joint command out, each cycle
 ///     indices.hpp          manipulability, condition number, smallest singular value, geometry-aware index; gradients
 ///     singularities.hpp    SingularSets: known singular sets of three arms, potentials, manipulability in closed form
+///     avoidance.hpp        Avoidance: a posture velocity away from singularities
+///     servo.hpp            Servo: pose or twist in, joint command out, each cycle
 ///     analytic_ik.hpp      AnalyticIk: every posture of a pose, for six joints with a spherical wrist
 ///     dynamics.hpp         Dynamics: mass matrix, Coriolis, gravity, by KDL (not included)
 ///     constrained_ik.hpp   ConstrainedIk: a pose exactly in part, the rest as limits allow; time scaling (not included)
@@ -28,6 +29,7 @@
 /// Set-up throws Error. Calls marked "real time" are noexcept, bounded, and touch neither heap nor lock.
 
 #include <sigmaik/analytic_ik.hpp>
+#include <sigmaik/avoidance.hpp>
 #include <sigmaik/batch.hpp>
 #include <sigmaik/chain.hpp>
 #include <sigmaik/error.hpp>
