@@ -1,6 +1,9 @@
 #pragma once
-// Scalars to put through a template: truncated Taylor series in K variables, of first or second order, and a recorder.
-// Templates use T·T, T + T, T − T, double·T and T + double alone.
+// Scalars to put through a template: truncated Taylor series that know when compiling which joints they depend on, and a
+// recorder. Templates use x·y, x + y, x − y, number·x and x + number alone.
+
+#include <bit>
+#include <utility>
 
 #include <sigmaik/singularities.hpp>
 
@@ -8,95 +11,120 @@
 
 namespace sigmaik::detail {
 
-// Value and gradient.
-template <int K>
-struct Jet1 {
-  double v = 0.0;
-  double g[K] = {};
+// A joint's index as a type.
+template <int i>
+using Joint = std::integral_constant<int, i>;
 
-  // sin or cos of variable k: f(x), f'(x).
-  static Jet1 of(int k, double value, double slope, double /*bend*/) noexcept {
-    Jet1 x;
-    x.v = value;
-    if (k >= 0 && k < K) x.g[k] = slope;
-    return x;
+// Calls f(Joint<i>) for every bit i of mask.
+template <unsigned mask, typename Function>
+SIGMAIK_INLINE void for_joints(Function&& f) {
+  if constexpr (mask != 0) {
+    f(Joint<std::countr_zero(mask)>{});
+    for_joints<mask & (mask - 1)>(f);
   }
-  friend SIGMAIK_INLINE Jet1 operator+(Jet1 x, const Jet1& y) noexcept {
-    x.v += y.v;
-    for (int i = 0; i < K; ++i) x.g[i] += y.g[i];
-    return x;
-  }
-  friend SIGMAIK_INLINE Jet1 operator-(Jet1 x, const Jet1& y) noexcept {
-    x.v -= y.v;
-    for (int i = 0; i < K; ++i) x.g[i] -= y.g[i];
-    return x;
-  }
-  friend SIGMAIK_INLINE Jet1 operator*(const Jet1& x, const Jet1& y) noexcept {
-    Jet1 z;
-    z.v = x.v * y.v;
-    for (int i = 0; i < K; ++i) z.g[i] = x.v * y.g[i] + y.v * x.g[i];
-    return z;
-  }
-  friend SIGMAIK_INLINE Jet1 operator*(double f, Jet1 x) noexcept {
-    x.v *= f;
-    for (int i = 0; i < K; ++i) x.g[i] *= f;
-    return x;
-  }
-  friend SIGMAIK_INLINE Jet1 operator+(Jet1 x, double c) noexcept {
-    x.v += c;
-    return x;
+}
+
+// Value, gradient and, of order 2, Hessian, in the joints of `mask`. Entries of others are zero, and not stored.
+template <unsigned mask, int order>
+struct Jet {
+  static constexpr unsigned kMask = mask;
+  static constexpr int kCount = std::popcount(mask);
+  static constexpr int kPairs = order == 2 ? kCount * (kCount + 1) / 2 : 1;
+  double v;
+  double g[kCount];
+  double h[kPairs];  // lower triangle, row after row
+
+  static constexpr bool has(int i) { return (mask >> i & 1u) != 0; }
+  static constexpr int at(int i) { return std::popcount(mask & ((1u << i) - 1u)); }
+  static constexpr int at(int i, int j) {  // i ≥ j
+    return at(i) * (at(i) + 1) / 2 + at(j);
   }
 };
 
-// Value, gradient and the Hessian's lower triangle, row after row.
-template <int K>
-struct Jet2 {
-  static constexpr int kPairs = K * (K + 1) / 2;
-  double v = 0.0;
-  double g[K] = {};
-  double h[kPairs] = {};
+// z.g = f(i), z.h = s(i, j) for all of z's joints i ≥ j.
+template <unsigned mask, int order, typename First, typename Second>
+SIGMAIK_INLINE void fill(Jet<mask, order>& z, First&& f, Second&& s) {
+  using Z = Jet<mask, order>;
+  for_joints<mask>([&](auto i) __attribute__((always_inline)) {
+    z.g[Z::at(i)] = f(i);
+    if constexpr (order == 2) {
+      for_joints<(mask & ((2u << i) - 1u))>(
+          [&](auto j) __attribute__((always_inline)) { z.h[Z::at(i, j)] = s(i, j); });
+    }
+  });
+}
 
-  static Jet2 of(int k, double value, double slope, double bend) noexcept {
-    Jet2 x;
-    x.v = value;
-    if (k >= 0 && k < K) {
-      x.g[k] = slope;
-      x.h[k * (k + 3) / 2] = bend;
-    }
-    return x;
+template <unsigned a, unsigned b, int order>
+SIGMAIK_INLINE Jet<a | b, order> operator+(const Jet<a, order>& x, const Jet<b, order>& y) {
+  using X = Jet<a, order>;
+  using Y = Jet<b, order>;
+  Jet<a | b, order> z;
+  z.v = x.v + y.v;
+  fill(
+      z,
+      [&](auto i) __attribute__((always_inline)) {
+        if constexpr (!Y::has(i)) return x.g[X::at(i)];
+        else if constexpr (!X::has(i)) return y.g[Y::at(i)];
+        else return x.g[X::at(i)] + y.g[Y::at(i)];
+      },
+      [&](auto i, auto j) __attribute__((always_inline)) {
+        double sum = 0.0;
+        if constexpr (X::has(i) && X::has(j)) sum = x.h[X::at(i, j)];
+        if constexpr (Y::has(i) && Y::has(j)) sum += y.h[Y::at(i, j)];
+        return sum;
+      });
+  return z;
+}
+
+template <unsigned a, int order>
+SIGMAIK_INLINE Jet<a, order> operator*(double f, Jet<a, order> x) {
+  x.v *= f;
+  for (double& g : x.g) g *= f;
+  if constexpr (order == 2) {
+    for (double& h : x.h) h *= f;
   }
-  friend SIGMAIK_INLINE Jet2 operator+(Jet2 x, const Jet2& y) noexcept {
-    x.v += y.v;
-    for (int i = 0; i < K; ++i) x.g[i] += y.g[i];
-    for (int i = 0; i < kPairs; ++i) x.h[i] += y.h[i];
-    return x;
-  }
-  friend SIGMAIK_INLINE Jet2 operator-(const Jet2& x, const Jet2& y) noexcept { return x + -1.0 * y; }
-  friend SIGMAIK_INLINE Jet2 operator*(const Jet2& x, const Jet2& y) noexcept {
-    Jet2 z;
-    z.v = x.v * y.v;
-    for (int i = 0; i < K; ++i) z.g[i] = x.v * y.g[i] + y.v * x.g[i];
-    for (int i = 0, at = 0; i < K; ++i) {
-      for (int j = 0; j <= i; ++j, ++at) z.h[at] = x.v * y.h[at] + y.v * x.h[at] + x.g[i] * y.g[j] + x.g[j] * y.g[i];
-    }
-    return z;
-  }
-  friend SIGMAIK_INLINE Jet2 operator*(double f, Jet2 x) noexcept {
-    x.v *= f;
-    for (int i = 0; i < K; ++i) x.g[i] *= f;
-    for (int i = 0; i < kPairs; ++i) x.h[i] *= f;
-    return x;
-  }
-  friend SIGMAIK_INLINE Jet2 operator+(Jet2 x, double c) noexcept {
-    x.v += c;
-    return x;
-  }
-};
+  return x;
+}
+
+template <unsigned a, int order>
+SIGMAIK_INLINE Jet<a, order> operator+(Jet<a, order> x, double c) {
+  x.v += c;
+  return x;
+}
+
+template <unsigned a, unsigned b, int order>
+SIGMAIK_INLINE Jet<a | b, order> operator-(const Jet<a, order>& x, const Jet<b, order>& y) {
+  return x + -1.0 * y;
+}
+
+template <unsigned a, unsigned b, int order>
+SIGMAIK_INLINE Jet<a | b, order> operator*(const Jet<a, order>& x, const Jet<b, order>& y) {
+  using X = Jet<a, order>;
+  using Y = Jet<b, order>;
+  Jet<a | b, order> z;
+  z.v = x.v * y.v;
+  fill(
+      z,
+      [&](auto i) __attribute__((always_inline)) {
+        if constexpr (!Y::has(i)) return y.v * x.g[X::at(i)];
+        else if constexpr (!X::has(i)) return x.v * y.g[Y::at(i)];
+        else return y.v * x.g[X::at(i)] + x.v * y.g[Y::at(i)];
+      },
+      [&](auto i, auto j) __attribute__((always_inline)) {
+        double sum = 0.0;
+        if constexpr (X::has(i) && X::has(j)) sum = y.v * x.h[X::at(i, j)];
+        if constexpr (Y::has(i) && Y::has(j)) sum += x.v * y.h[Y::at(i, j)];
+        if constexpr (X::has(i) && Y::has(j)) sum += x.g[X::at(i)] * y.g[Y::at(j)];
+        if constexpr (X::has(j) && Y::has(i)) sum += x.g[X::at(j)] * y.g[Y::at(i)];
+        return sum;
+      });
+  return z;
+}
 
 // Writes down what is done to it.
 struct Recorded {
-  Tape* tape = nullptr;
-  int index = 0;
+  Tape* tape;
+  int index;
 
   static Recorded record(Tape* tape, const Operation& operation) {
     tape->operations.push_back(operation);
@@ -116,6 +144,53 @@ struct Recorded {
   }
   friend Recorded operator+(const Recorded& x, double c) {
     return x + record(x.tape, {Operation::Constant, 0, 0, c});
+  }
+};
+
+// The joints' sines and cosines, in each kind of scalar: x.s(Joint<i>), x.c(Joint<i>).
+struct Values {
+  const double *sine, *cosine;
+  template <int i>
+  SIGMAIK_INLINE double s(Joint<i>) const {
+    return sine[i];
+  }
+  template <int i>
+  SIGMAIK_INLINE double c(Joint<i>) const {
+    return cosine[i];
+  }
+};
+
+template <int order>
+struct Jets {
+  const double *sine, *cosine;
+  template <int i>
+  SIGMAIK_INLINE Jet<1u << i, order> s(Joint<i>) const {
+    return {sine[i], {cosine[i]}, {-sine[i]}};
+  }
+  template <int i>
+  SIGMAIK_INLINE Jet<1u << i, order> c(Joint<i>) const {
+    return {cosine[i], {-sine[i]}, {-cosine[i]}};
+  }
+};
+
+struct Recording {
+  Tape* tape;
+  template <int i>
+  Recorded s(Joint<i>) const {
+    return of(Operation::Sin, i);
+  }
+  template <int i>
+  Recorded c(Joint<i>) const {
+    return of(Operation::Cos, i);
+  }
+
+ private:
+  Recorded of(Operation::Kind kind, int joint) const {  // once each
+    for (std::size_t at = 0; at < tape->operations.size(); ++at) {
+      const Operation& o = tape->operations[at];
+      if (o.kind == kind && o.a == joint) return {tape, static_cast<int>(at)};
+    }
+    return Recorded::record(tape, {kind, joint});
   }
 };
 

@@ -1,21 +1,28 @@
 #pragma once
 // What is known of each arm: one description, from which values, derivatives, expressions and texts come.
 //
-// `residuals` and `minors` are templates over the scalar; s[i], c[i] are sin and cos of the chain's joint i. The squares of
-// the minors add up to m² = det(JJᵀ). The Comau's come from its spherical wrist. Both seven-joint arms have axes 1 to 3
-// through the shoulder: about that point m² is a sum over 3×3 minors of the moments of axes 4 to 7 (Cauchy-Binet).
+// `residuals` and `minors` are templates over the scalar: x.s(q4), x.c(q4) are sin and cos of the chain's fourth joint. The
+// squares of the minors add up to m² = det(JJᵀ). The Comau's come from its spherical wrist. Both seven-joint arms have axes
+// 1 to 3 through the shoulder: about that point m² is a sum over 3×3 minors of the moments of axes 4 to 7 (Cauchy-Binet).
 
 #include <array>
+#include <tuple>
 
 #include <sigmaik/singularities.hpp>
 
-#include "lanes.hpp"
+#include "jets.hpp"
 
 namespace sigmaik::detail {
 
+inline constexpr Joint<1> q2{};
+inline constexpr Joint<2> q3{};
+inline constexpr Joint<3> q4{};
+inline constexpr Joint<4> q5{};
+inline constexpr Joint<5> q6{};
+
 struct ComauRacer {
   static constexpr const char* kName = "comau_racer_7_1_4";
-  static constexpr int kDof = 6, kFirst = 1, kVariables = 4, kSets = 3, kResiduals = 3, kMinors = 1;
+  static constexpr int kDof = 6, kSets = 3;
   static constexpr std::array<int, kSets> kCodimension{1, 1, 1};
   static std::array<SingularSet, kSets> sets() {
     return {{{"wrist", "sin q5 = 0", 1, {4}},
@@ -26,24 +33,21 @@ struct ComauRacer {
   static constexpr double l = 0.6962442100297855;  // √(a3² + d4²)
 
   // The paper's angles are θ2 = π/2 − q2 and θ3 = q3 + π/2, so that θ2 + θ3 = π + q3 − q2.
-  template <typename T>
-  struct Parts {
-    T elbow, radius;  // a3 sin θ3 − d4 cos θ3, and the wrist's distance from axis 1
-    SIGMAIK_INLINE Parts(const T* s, const T* c)
-        : elbow(a3 * c[2] + d4 * s[2]),
-          radius(a2 * s[1] + (-a3) * (c[2] * c[1] + s[2] * s[1]) + (-d4) * (s[2] * c[1] - c[2] * s[1]) + a1) {}
-  };
-  template <typename T>
-  static SIGMAIK_INLINE void residuals(const T* s, const T* c, T* r) {
-    const Parts<T> p(s, c);
-    r[0] = s[4];
-    r[1] = (1.0 / l) * p.elbow;
-    r[2] = (1.0 / (a2 + l)) * p.radius;
+  template <typename X>
+  static SIGMAIK_INLINE auto elbow(const X& x) {
+    return a3 * x.c(q3) + d4 * x.s(q3);  // a3 sin θ3 − d4 cos θ3
   }
-  template <typename T>
-  static SIGMAIK_INLINE void minors(const T* s, const T* c, T* m) {
-    const Parts<T> p(s, c);
-    m[0] = a2 * (s[4] * p.elbow * p.radius);
+  template <typename X>
+  static SIGMAIK_INLINE auto radius(const X& x) {  // from axis 1 to the wrist
+    return x.s(q2) * (a3 * -1.0 * x.s(q3) + d4 * x.c(q3) + a2) + x.c(q2) * (-a3 * x.c(q3) + -d4 * x.s(q3)) + a1;
+  }
+  template <typename X>
+  static SIGMAIK_INLINE auto residuals(const X& x) {
+    return std::tuple(x.s(q5), (1.0 / l) * elbow(x), (1.0 / (a2 + l)) * radius(x));
+  }
+  template <typename X>
+  static SIGMAIK_INLINE auto minors(const X& x) {
+    return std::tuple(a2 * (x.s(q5) * (elbow(x) * radius(x))));
   }
 };
 
@@ -58,43 +62,38 @@ struct PandaLengths {
 
 // Of axis 5: P its distance from the shoulder; (−C, A) the wrist as the shoulder sees it; K is zero where shoulder, elbow
 // and wrist are in line; F, with cos q5, where the moments of axes 4, 6 and 7 lie in a plane.
-template <typename Lengths, typename T>
-struct SevenJoints : Lengths {
-  using Lengths::a4, Lengths::a5, Lengths::a7, Lengths::d3, Lengths::d5;
-  T P, A, B, C, K, F;
-  SIGMAIK_INLINE SevenJoints(const T* s, const T* c)
-      : P(a4 * c[3] + d3 * s[3] + a5),
-        A(a5 * s[3] + d5 * c[3] + d3),
-        B((-a4) * s[3] + d3 * c[3] + d5),
-        C((-a5) * c[3] + d5 * s[3] + (-a4)),
-        K(d3 * C + a4 * A),
-        F(s[5] * K + a7 * (P + (-a5))) {}
+template <typename L, typename X>
+struct SevenJoints {
+  using Elbow = decltype(1.0 * std::declval<X>().s(q4) + 1.0 * std::declval<X>().c(q4));
+  using Wrist = decltype(std::declval<X>().s(q6) * std::declval<Elbow>());
+  static constexpr double d3 = L::d3, d5 = L::d5, a4 = L::a4, a5 = L::a5, a7 = L::a7;
+  Elbow P, A, B, C, K;
+  Wrist F;
+  SIGMAIK_INLINE explicit SevenJoints(const X& x)
+      : P(d3 * x.s(q4) + a4 * x.c(q4) + a5),
+        A(a5 * x.s(q4) + d5 * x.c(q4) + d3),
+        B(-a4 * x.s(q4) + d3 * x.c(q4) + d5),
+        C(d5 * x.s(q4) + -a5 * x.c(q4) + -a4),
+        K((d3 * d5 + a4 * a5) * x.s(q4) + (a4 * d5 - d3 * a5) * x.c(q4)),  // d3 C + a4 A
+        F(x.s(q6) * K + a7 * (P + -a5)) {}
 };
 
-template <typename Lengths, typename T>
-SIGMAIK_INLINE void seven_joint_minors(const T* s, const T* c, T* m) {
-  using L = Lengths;
-  const SevenJoints<L, T> e(s, c);
-  const T& F = e.F;
-  const T k5 = c[4] * e.K, t = s[4] * e.P;
-  const T cp = c[4] * e.P;
-  const T d5 = e.B * (s[4] * s[4] * F) + k5 * (L::twist5 * (c[5] * e.P) + c[4] * (e.B * s[5] + L::a7));
-  const T hx = e.C * F + (L::a4 * L::a7) * (c[4] * cp);
-  const T hz = e.A * F - (L::d3 * L::a7) * (c[4] * cp);
-  const T hy = (-L::a5 * L::a7) * (s[4] * cp);
-  const T u = c[2] * hx - s[2] * hy, w = s[2] * hx + c[2] * hy;  // both negated
-  m[0] = L::a7 * (s[1] * (t * cp));
-  m[1] = s[1] * d5;
-  m[2] = s[1] * (t * F);
-  m[3] = s[1] * (e.P * k5);
-  m[4] = s[1] * w;
-  m[5] = u;
-  m[6] = s[1] * hz - c[1] * u;
+template <typename L, typename X>
+SIGMAIK_INLINE auto seven_joint_minors(const X& x) {
+  const SevenJoints<L, X> e(x);
+  const auto s5 = x.s(q5), c5 = x.c(q5), s2 = x.s(q2), c2 = x.c(q2), s3 = x.s(q3), c3 = x.c(q3);
+  const auto k5 = c5 * e.K, sp = s5 * e.P, cp = c5 * e.P;
+  const auto d5 = e.B * (s5 * s5 * e.F) + k5 * (L::twist5 * (x.c(q6) * e.P) + c5 * (e.B * x.s(q6) + L::a7));
+  const auto hx = e.C * e.F + (L::a4 * L::a7) * (c5 * cp);
+  const auto hy = (-L::a5 * L::a7) * (s5 * cp);
+  const auto hz = e.A * e.F + (-L::d3 * L::a7) * (c5 * cp);
+  const auto u = c3 * hx - s3 * hy, w = s3 * hx + c3 * hy;
+  return std::tuple(L::a7 * (s2 * (sp * cp)), s2 * d5, s2 * (sp * e.F), s2 * (e.P * k5), s2 * w, u, s2 * hz - c2 * u);
 }
 
 struct Iiwa14 {
   static constexpr const char* kName = "kuka_lbr_iiwa_14_r820";
-  static constexpr int kDof = 7, kFirst = 1, kVariables = 5, kSets = 4, kResiduals = 7, kMinors = 7;
+  static constexpr int kDof = 7, kSets = 4;
   static constexpr std::array<int, kSets> kCodimension{1, 2, 2, 2};
   static std::array<SingularSet, kSets> sets() {
     return {{{"elbow", "sin q4 = 0: stretched or folded", 1, {3}},
@@ -102,25 +101,19 @@ struct Iiwa14 {
              {"shoulder-wrist", "sin q2 = 0 and sin q6 = 0", 2, {1, 5}},
              {"wrist", "cos q5 = 0 and sin q6 = 0", 2, {4, 5}}}};
   }
-  template <typename T>
-  static SIGMAIK_INLINE void residuals(const T* s, const T* c, T* r) {
-    r[0] = s[3];
-    r[1] = s[1];
-    r[2] = c[2];
-    r[3] = s[1];
-    r[4] = s[5];
-    r[5] = c[4];
-    r[6] = s[5];
+  template <typename X>
+  static SIGMAIK_INLINE auto residuals(const X& x) {
+    return std::tuple(x.s(q4), x.s(q2), x.c(q3), x.s(q2), x.s(q6), x.c(q5), x.s(q6));
   }
-  template <typename T>
-  static SIGMAIK_INLINE void minors(const T* s, const T* c, T* m) {
-    seven_joint_minors<IiwaLengths>(s, c, m);
+  template <typename X>
+  static SIGMAIK_INLINE auto minors(const X& x) {
+    return seven_joint_minors<IiwaLengths>(x);
   }
 };
 
 struct Panda {
   static constexpr const char* kName = "franka_panda";
-  static constexpr int kDof = 7, kFirst = 1, kVariables = 5, kSets = 4, kResiduals = 8, kMinors = 7;
+  static constexpr int kDof = 7, kSets = 4;
   static constexpr std::array<int, kSets> kCodimension{2, 2, 2, 2};
   static std::array<SingularSet, kSets> sets() {
     return {{{"wrist", "cos q5 = 0 and K(q4) sin q6 + 0.088 (0.316 sin q4 + 0.0825 cos q4) = 0", 2, {3, 4, 5}},
@@ -131,22 +124,20 @@ struct Panda {
   using L = PandaLengths;
   static constexpr double rho3 = 0.3265918706887849, rho5 = 0.39276233271534583;  // √(d3² + a4²), √(d5² + a5²)
 
-  template <typename T>
-  static SIGMAIK_INLINE void residuals(const T* s, const T* c, T* r) {
-    const SevenJoints<L, T> e(s, c);
-    const T g = c[2] * (e.C * e.F) + L::a7 * (c[4] * e.P * (L::a4 * (c[2] * c[4]) + L::a5 * (s[2] * s[4])));
-    r[0] = c[4];
-    r[1] = (1.0 / (rho3 * rho5)) * e.F;
-    r[2] = s[4];
-    r[3] = (1.0 / (rho3 * rho5)) * e.K;
-    r[4] = s[1];
-    r[5] = (1.0 / (rho3 * rho5 * rho5)) * g;
-    r[6] = (1.0 / rho3) * e.P;
-    r[7] = (1.0 / (L::d3 + L::d5)) * (e.B * s[5] + L::a7);
+  template <typename X>
+  static SIGMAIK_INLINE auto residuals(const X& x) {
+    const SevenJoints<L, X> e(x);
+    const auto c5 = x.c(q5);
+    // c3 C F + a7 c5 P (a4 c3 c5 + a5 s3 s5)
+    const auto p = L::a7 * (c5 * e.P);
+    const auto g = x.c(q3) * (e.C * e.F + L::a4 * (p * c5)) + x.s(q3) * (L::a5 * (p * x.s(q5)));
+    return std::tuple(c5, (1.0 / (rho3 * rho5)) * e.F, x.s(q5), (1.0 / (rho3 * rho5)) * e.K, x.s(q2),
+                      (1.0 / (rho3 * rho5 * rho5)) * g, (1.0 / rho3) * e.P,
+                      (1.0 / (L::d3 + L::d5)) * (e.B * x.s(q6) + L::a7));
   }
-  template <typename T>
-  static SIGMAIK_INLINE void minors(const T* s, const T* c, T* m) {
-    seven_joint_minors<L>(s, c, m);
+  template <typename X>
+  static SIGMAIK_INLINE auto minors(const X& x) {
+    return seven_joint_minors<L>(x);
   }
 };
 

@@ -1,11 +1,14 @@
 #include <sigmaik/singularities.hpp>
 
 #include <cmath>
+#include <tuple>
 #include <type_traits>
+#include <utility>
 
 #include <sigmaik/error.hpp>
 #include <sigmaik/kinematics.hpp>
 
+#include "elementary.hpp"
 #include "jets.hpp"
 #include "message.hpp"
 #include "singular_arms.hpp"
@@ -30,172 +33,296 @@ class SingularSets::Model {
 
 namespace {
 
-using detail::Jet1;
-using detail::Jet2;
-using detail::Recorded;
+using detail::Jet;
+using detail::Jets;
+using detail::Values;
 
-// sin and cos of the joints that matter, as scalars of any kind.
-template <typename Arm, typename T>
+// Sines and cosines of all joints, padded to whole vectors.
 struct SinCos {
-  T s[Arm::kDof], c[Arm::kDof];
+  double sine[8], cosine[8];
 
-  explicit SinCos(const JointRef& q) noexcept {
-    for (int i = Arm::kFirst, k = 0; k < Arm::kVariables; ++i, ++k) {
-      double sine, cosine;
-      ::sincos(q[i], &sine, &cosine);
-      if constexpr (std::is_same_v<T, double>) {
-        s[i] = sine;
-        c[i] = cosine;
-      } else {
-        s[i] = T::of(k, sine, cosine, -sine);
-        c[i] = T::of(k, cosine, -sine, -cosine);
+  template <int lanes>
+  SIGMAIK_INLINE static SinCos of(const double* q, int n) {
+    SinCos out;
+    detail::sincos_all<lanes, 8>(q, n, out.sine, out.cosine);
+    return out;
+  }
+};
+
+// Calls f(Joint<k>, element k) for every element of a tuple.
+template <typename Tuple, typename Function>
+SIGMAIK_INLINE void for_each(const Tuple& tuple, Function&& f) {
+  [&]<std::size_t... k>(std::index_sequence<k...>) __attribute__((always_inline)) {
+    (f(detail::Joint<static_cast<int>(k)>{}, std::get<k>(tuple)), ...);
+  }(std::make_index_sequence<std::tuple_size_v<Tuple>>{});
+}
+
+// The kernels of an arm. `gradient` is (n,), `hessian` (n, n) with columns n apart; both are written whole.
+template <typename Arm, int lanes>
+struct Kernels {
+  static constexpr int n = Arm::kDof;
+  using Residuals = decltype(Arm::residuals(Values{}));
+  using Minors = decltype(Arm::minors(Values{}));
+  static constexpr int kResiduals = std::tuple_size_v<Residuals>, kMinors = std::tuple_size_v<Minors>;
+
+  // Which set a residual belongs to.
+  static constexpr std::array<int, kResiduals> kSet = [] {
+    std::array<int, kResiduals> out{};
+    for (int set = 0, at = 0; set < Arm::kSets; ++set) {
+      for (int j = 0; j < Arm::kCodimension[static_cast<std::size_t>(set)]; ++j) out[static_cast<std::size_t>(at++)] = set;
+    }
+    return out;
+  }();
+
+  static SIGMAIK_INLINE void residuals(const double* q, double* r) {
+    const SinCos x = SinCos::of<lanes>(q, n);
+    for_each(Arm::residuals(Values{x.sine, x.cosine}),
+             [&](auto k, double value) __attribute__((always_inline)) { r[k] = value; });
+  }
+
+  static SIGMAIK_INLINE double potential(const double* q, const Potential& p) {
+    double r[kResiduals], psi[kMaxSets] = {}, phi[kMaxSets];
+    residuals(q, r);
+    for (int k = 0; k < kResiduals; ++k) psi[kSet[static_cast<std::size_t>(k)]] += r[k] * r[k];
+    return potentials(psi, p, phi);
+  }
+
+  // φ_i, and their sum, weighted.
+  static SIGMAIK_INLINE double potentials(const double (&psi)[kMaxSets], const Potential& p, double (&phi)[kMaxSets]) {
+    double exponents[kMaxSets];
+    for (int i = 0; i < kMaxSets; ++i) exponents[i] = p.eta1 - p.eta2 * psi[i];
+    detail::exp_all<lanes, kMaxSets>(exponents, phi);
+    double sum = 0.0;
+    for (int i = 0; i < kMaxSets; ++i) {
+      phi[i] *= i < Arm::kSets ? p.weights[static_cast<std::size_t>(i)] : 0.0;
+      sum += phi[i];
+    }
+    return sum;
+  }
+
+  // Adds f x ∇x, and f (∇x∇xᵀ + x ∇²x): half of the derivatives of f x².
+  template <unsigned mask, int order>
+  static SIGMAIK_INLINE void add_square(const Jet<mask, order>& x, double f, double* gradient, double* hessian) {
+    using X = Jet<mask, order>;
+    const double fx = f * x.v;
+    detail::for_joints<mask>([&](auto i) __attribute__((always_inline)) {
+      gradient[i] += fx * x.g[X::at(i)];
+      if constexpr (order == 2) {
+        detail::for_joints<(mask & ((2u << i) - 1u))>([&](auto j) __attribute__((always_inline)) {
+          hessian[j * n + i] += f * x.g[X::at(i)] * x.g[X::at(j)] + fx * x.h[X::at(i, j)];
+        });
       }
+    });
+  }
+
+  static SIGMAIK_INLINE void mirror(double* hessian) {
+    for (int j = 0; j < n; ++j) {
+      for (int i = 0; i < j; ++i) hessian[j * n + i] = hessian[i * n + j];
+    }
+  }
+  template <int order>
+  static SIGMAIK_INLINE void clear(double* gradient, double* hessian) {
+    for (int i = 0; i < n; ++i) gradient[i] = 0.0;
+    if constexpr (order == 2) {
+      for (int i = 0; i < n * n; ++i) hessian[i] = 0.0;
+    }
+  }
+
+  static SIGMAIK_INLINE double psi(int set, const double* q, double* gradient, double* hessian) {
+    const SinCos x = SinCos::of<lanes>(q, n);
+    clear<2>(gradient, hessian);
+    double sum = 0.0;
+    for_each(Arm::residuals(Jets<2>{x.sine, x.cosine}), [&](auto k, const auto& r) __attribute__((always_inline)) {
+      if (kSet[static_cast<std::size_t>(k())] != set) return;
+      sum += r.v * r.v;
+      add_square(r, 2.0, gradient, hessian);
+    });
+    mirror(hessian);
+    return sum;
+  }
+
+  // ∇φ = −η₂ φ ∇ψ,  ∇²φ = φ (η₂² ∇ψ∇ψᵀ − η₂ ∇²ψ).
+  template <int order>
+  static SIGMAIK_INLINE double potential(const double* q, const Potential& p, double* gradient, double* hessian) {
+    const SinCos x = SinCos::of<lanes>(q, n);
+    const auto r = Arm::residuals(Jets<order>{x.sine, x.cosine});
+    double psi[kMaxSets] = {}, phi[kMaxSets];
+    for_each(r, [&](auto k, const auto& jet) __attribute__((always_inline)) {
+      psi[kSet[static_cast<std::size_t>(k())]] += jet.v * jet.v;
+    });
+    const double sum = potentials(psi, p, phi);
+    clear<order>(gradient, hessian);
+    double slopes[Arm::kSets][n] = {};  // ∇ψ_i
+    for_each(r, [&](auto k, const auto& jet) __attribute__((always_inline)) {
+      constexpr int set = kSet[static_cast<std::size_t>(decltype(k)::value)];
+      using J = std::decay_t<decltype(jet)>;
+      add_square(jet, -2.0 * p.eta2 * phi[set], gradient, hessian);
+      if constexpr (order == 2) {
+        detail::for_joints<J::kMask>(
+            [&](auto i) __attribute__((always_inline)) { slopes[set][i] += 2.0 * jet.v * jet.g[J::at(i)]; });
+      }
+    });
+    if constexpr (order == 2) {
+      for (int set = 0; set < Arm::kSets; ++set) {
+        const double f = p.eta2 * p.eta2 * phi[set];
+        for (int j = 0; j < n; ++j) {
+          for (int i = j; i < n; ++i) hessian[j * n + i] += f * slopes[set][i] * slopes[set][j];
+        }
+      }
+      mirror(hessian);
+    }
+    return sum;
+  }
+
+  static SIGMAIK_INLINE double manipulability(const double* q) {
+    const SinCos x = SinCos::of<lanes>(q, n);
+    double square = 0.0;
+    for_each(Arm::minors(Values{x.sine, x.cosine}),
+             [&](auto, double m) __attribute__((always_inline)) { square += m * m; });
+    return std::sqrt(square);
+  }
+
+  // ∇m = ∇(m²)/2m,  ∇²m = (∇²(m²)/2 − ∇m∇mᵀ)/m; of a single minor, without the cancellation.
+  template <int order>
+  static SIGMAIK_INLINE double manipulability(const double* q, double* gradient, double* hessian) {
+    const SinCos x = SinCos::of<lanes>(q, n);
+    const auto minors = Arm::minors(Jets<order>{x.sine, x.cosine});
+    clear<order>(gradient, hessian);
+    if constexpr (kMinors == 1) {
+      const auto& m = std::get<0>(minors);
+      using M = std::decay_t<decltype(m)>;
+      const double sign = m.v > 0.0 ? 1.0 : m.v < 0.0 ? -1.0 : 0.0;
+      detail::for_joints<M::kMask>([&](auto i) __attribute__((always_inline)) {
+        gradient[i] = sign * m.g[M::at(i)];
+        if constexpr (order == 2) {
+          detail::for_joints<(M::kMask & ((2u << i) - 1u))>(
+              [&](auto j) __attribute__((always_inline)) { hessian[j * n + i] = sign * m.h[M::at(i, j)]; });
+        }
+      });
+      if constexpr (order == 2) mirror(hessian);
+      return std::abs(m.v);
+    } else {
+      double square = 0.0;
+      for_each(minors, [&](auto, const auto& m) __attribute__((always_inline)) { square += m.v * m.v; });
+      const double value = std::sqrt(square);
+      if (!(value > 0.0)) return 0.0;
+      const double inverse = 1.0 / value;
+      for_each(minors,
+               [&](auto, const auto& m) __attribute__((always_inline)) { add_square(m, inverse, gradient, hessian); });
+      if constexpr (order == 2) {
+        for (int j = 0; j < n; ++j) {
+          for (int i = j; i < n; ++i) hessian[j * n + i] -= inverse * gradient[i] * gradient[j];
+        }
+        mirror(hessian);
+      }
+      return value;
     }
   }
 };
 
+// The kernels' entries, for one width of vectors.
+template <typename Arm>
+struct Entries {
+  void (*residuals)(const double* q, double* r);
+  double (*psi)(int set, const double* q, double* gradient, double* hessian);
+  double (*potential)(const double* q, const Potential& p);
+  double (*potential_gradient)(const double* q, const Potential& p, double* gradient);
+  double (*potential_hessian)(const double* q, const Potential& p, double* gradient, double* hessian);
+  double (*manipulability)(const double* q);
+  double (*manipulability_gradient)(const double* q, double* gradient);
+  double (*manipulability_hessian)(const double* q, double* gradient, double* hessian);
+};
+
+// One function a kernel and width: the attribute lets the compiler use the processor's vectors in what it inlines.
+#define SIGMAIK_ENTRIES(NAME, LANES, ATTRIBUTES)                                                                         \
+  template <typename Arm>                                                                                                \
+  struct NAME {                                                                                                          \
+    using K = Kernels<Arm, LANES>;                                                                                       \
+    ATTRIBUTES static void residuals(const double* q, double* r) { K::residuals(q, r); }                                 \
+    ATTRIBUTES static double psi(int i, const double* q, double* g, double* h) { return K::psi(i, q, g, h); }            \
+    ATTRIBUTES static double value(const double* q, const Potential& p) { return K::potential(q, p); }                   \
+    ATTRIBUTES static double gradient(const double* q, const Potential& p, double* g) {                                  \
+      return K::template potential<1>(q, p, g, nullptr);                                                                 \
+    }                                                                                                                    \
+    ATTRIBUTES static double hessian(const double* q, const Potential& p, double* g, double* h) {                        \
+      return K::template potential<2>(q, p, g, h);                                                                       \
+    }                                                                                                                    \
+    ATTRIBUTES static double m(const double* q) { return K::manipulability(q); }                                         \
+    ATTRIBUTES static double m_gradient(const double* q, double* g) {                                                    \
+      return K::template manipulability<1>(q, g, nullptr);                                                               \
+    }                                                                                                                    \
+    ATTRIBUTES static double m_hessian(const double* q, double* g, double* h) {                                          \
+      return K::template manipulability<2>(q, g, h);                                                                     \
+    }                                                                                                                    \
+    static constexpr Entries<Arm> all{residuals, psi, value, gradient, hessian, m, m_gradient, m_hessian};               \
+  }
+
+SIGMAIK_ENTRIES(Baseline, 2, );
+#if defined(__x86_64__) && !defined(SIGMAIK_NO_DISPATCH)
+SIGMAIK_ENTRIES(Wide, 4, __attribute__((target("avx2,fma"))));
+#endif
+#undef SIGMAIK_ENTRIES
+
+template <typename Arm>
+const Entries<Arm>& entries() {
+#if defined(__x86_64__) && !defined(SIGMAIK_NO_DISPATCH)
+  __builtin_cpu_init();
+  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) return Wide<Arm>::all;
+#endif
+  return Baseline<Arm>::all;
+}
+
 template <typename Arm>
 class ArmModel final : public SingularSets::Model {
-  static constexpr int K = Arm::kVariables;
-  using First = Jet1<K>;
-  using Second = Jet2<K>;
-
  public:
-  ArmModel() {
+  ArmModel() : run_(entries<Arm>()) {
     name = Arm::kName;
     dof = Arm::kDof;
-    residual_count = Arm::kResiduals;
+    residual_count = Kernels<Arm, 2>::kResiduals;
     const auto list = Arm::sets();
     sets.assign(list.begin(), list.end());
   }
 
-  void residuals(const JointRef& q, double* r) const noexcept override {
-    const SinCos<Arm, double> x(q);
-    Arm::residuals(x.s, x.c, r);
-  }
+  void residuals(const JointRef& q, double* r) const noexcept override { run_.residuals(q.data(), r); }
 
   double psi(int i, const JointRef& q, JointVector& gradient, JointMatrix& hessian) const noexcept override {
-    const SinCos<Arm, Second> x(q);
-    Second r[Arm::kResiduals];
-    Arm::residuals(x.s, x.c, r);
-    int at = 0;
-    for (int j = 0; j < i; ++j) at += Arm::kCodimension[static_cast<std::size_t>(j)];
-    const Second sum = square_sum(r + at, Arm::kCodimension[static_cast<std::size_t>(i)]);
-    clear(&gradient, &hessian);
-    add(sum, 1.0, 0.0, &gradient, &hessian);
-    return sum.v;
+    gradient.resize(dof);
+    hessian.resize(dof, dof);
+    return run_.psi(i, q.data(), gradient.data(), hessian.data());
   }
 
   double potential(const JointRef& q, const Potential& p, JointVector* gradient,
                    JointMatrix* hessian) const noexcept override {
-    if (hessian != nullptr) return potential_of<Second>(q, p, gradient, hessian);
-    if (gradient != nullptr) return potential_of<First>(q, p, gradient, hessian);
-    double r[Arm::kResiduals];
-    residuals(q, r);
-    double sum = 0.0;
-    const double* from = r;
-    for (std::size_t i = 0; i < Arm::kSets; ++i) {
-      const double psi = square_sum(from, Arm::kCodimension[i]);
-      from += Arm::kCodimension[i];
-      sum += p.weights[i] * std::exp(p.eta1 - p.eta2 * psi);
-    }
-    return sum;
+    if (gradient == nullptr) return run_.potential(q.data(), p);
+    gradient->resize(dof);
+    if (hessian == nullptr) return run_.potential_gradient(q.data(), p, gradient->data());
+    hessian->resize(dof, dof);
+    return run_.potential_hessian(q.data(), p, gradient->data(), hessian->data());
   }
 
   double manipulability(const JointRef& q, JointVector* gradient, JointMatrix* hessian) const noexcept override {
-    if (hessian != nullptr) return manipulability_of<Second>(q, gradient, hessian);
-    if (gradient != nullptr) return manipulability_of<First>(q, gradient, hessian);
-    const SinCos<Arm, double> x(q);
-    double m[Arm::kMinors];
-    Arm::minors(x.s, x.c, m);
-    return std::sqrt(square_sum(m, Arm::kMinors));
+    if (gradient == nullptr) return run_.manipulability(q.data());
+    gradient->resize(dof);
+    if (hessian == nullptr) return run_.manipulability_gradient(q.data(), gradient->data());
+    hessian->resize(dof, dof);
+    return run_.manipulability_hessian(q.data(), gradient->data(), hessian->data());
   }
 
   Tape residual_tape() const override {
-    return record<Arm::kResiduals>([](const auto* s, const auto* c, auto* out) { Arm::residuals(s, c, out); });
+    Tape tape;
+    for_each(Arm::residuals(detail::Recording{&tape}),
+             [&](auto, const detail::Recorded& r) { tape.results.push_back(r.index); });
+    return tape;
   }
   Tape manipulability_tape() const override {
-    return record<Arm::kMinors>([](const auto* s, const auto* c, auto* out) { Arm::minors(s, c, out); });
+    Tape tape;
+    for_each(Arm::minors(detail::Recording{&tape}),
+             [&](auto, const detail::Recorded& r) { tape.results.push_back(r.index); });
+    return tape;
   }
 
  private:
-  template <typename T>
-  static T square_sum(const T* r, int count) noexcept {
-    T sum = r[0] * r[0];
-    for (int i = 1; i < count; ++i) sum = sum + r[i] * r[i];
-    return sum;
-  }
-
-  static void clear(JointVector* gradient, JointMatrix* hessian) noexcept {
-    gradient->setZero(Arm::kDof);
-    if (hessian != nullptr) hessian->setZero(Arm::kDof, Arm::kDof);
-  }
-
-  // Adds a times the jet's gradient, and a times its Hessian plus b times its gradient's square.
-  static void add(const First& x, double a, double /*b*/, JointVector* gradient, JointMatrix* /*hessian*/) noexcept {
-    for (int i = 0; i < K; ++i) (*gradient)[Arm::kFirst + i] += a * x.g[i];
-  }
-  static void add(const Second& x, double a, double b, JointVector* gradient, JointMatrix* hessian) noexcept {
-    for (int i = 0, at = 0; i < K; ++i) {
-      (*gradient)[Arm::kFirst + i] += a * x.g[i];
-      for (int j = 0; j <= i; ++j, ++at) {
-        const double value = a * x.h[at] + b * x.g[i] * x.g[j];
-        (*hessian)(Arm::kFirst + i, Arm::kFirst + j) += value;
-        if (i != j) (*hessian)(Arm::kFirst + j, Arm::kFirst + i) += value;
-      }
-    }
-  }
-
-  // ∇φ = −η₂ φ ∇ψ,  ∇²φ = φ (η₂² ∇ψ∇ψᵀ − η₂ ∇²ψ).
-  template <typename T>
-  double potential_of(const JointRef& q, const Potential& p, JointVector* gradient, JointMatrix* hessian) const noexcept {
-    const SinCos<Arm, T> x(q);
-    T r[Arm::kResiduals];
-    Arm::residuals(x.s, x.c, r);
-    clear(gradient, hessian);
-    double sum = 0.0;
-    const T* from = r;
-    for (std::size_t i = 0; i < Arm::kSets; ++i) {
-      const T psi = square_sum(from, Arm::kCodimension[i]);
-      from += Arm::kCodimension[i];
-      const double phi = p.weights[i] * std::exp(p.eta1 - p.eta2 * psi.v);
-      sum += phi;
-      add(psi, -p.eta2 * phi, p.eta2 * p.eta2 * phi, gradient, hessian);
-    }
-    return sum;
-  }
-
-  // ∇m = ∇(m²)/2m,  ∇²m = (∇²(m²)/2 − ∇m∇mᵀ)/m; of a single minor, without the cancellation.
-  template <typename T>
-  double manipulability_of(const JointRef& q, JointVector* gradient, JointMatrix* hessian) const noexcept {
-    const SinCos<Arm, T> x(q);
-    T m[Arm::kMinors];
-    Arm::minors(x.s, x.c, m);
-    clear(gradient, hessian);
-    if constexpr (Arm::kMinors == 1) {
-      add(m[0], m[0].v > 0.0 ? 1.0 : m[0].v < 0.0 ? -1.0 : 0.0, 0.0, gradient, hessian);
-      return std::abs(m[0].v);
-    } else {
-      const T square = square_sum(m, Arm::kMinors);
-      const double value = std::sqrt(square.v);
-      if (!(value > 0.0)) return 0.0;
-      add(square, 0.5 / value, -0.25 / (square.v * value), gradient, hessian);
-      return value;
-    }
-  }
-
-  template <int kCount, typename Function>
-  static Tape record(Function function) {
-    Tape tape;
-    Recorded s[Arm::kDof], c[Arm::kDof], out[kCount];
-    for (int i = Arm::kFirst; i < Arm::kFirst + K; ++i) {
-      s[i] = Recorded::record(&tape, {Operation::Sin, i});
-      c[i] = Recorded::record(&tape, {Operation::Cos, i});
-    }
-    function(s, c, out);
-    for (const Recorded& result : out) tape.results.push_back(result.index);
-    return tape;
-  }
+  const Entries<Arm>& run_;
 };
 
 const std::vector<const SingularSets::Model*>& models() {
