@@ -546,7 +546,7 @@ class Servo:
     It integrates its own command (q ← q + q̇ dt) and reads no measured positions. Every command holds
     the chain's limits and leaves room to go on holding them; a start outside them comes back.
     """
-    def __init__(self, chain: Chain, method: PseudoInverse | DampedLeastSquares | AdaptiveDampedLeastSquares | SelectivelyDampedLeastSquares | JParse | JacobianProjection | JacobianSafety | JacobianSafetyProjection, dt: typing.SupportsFloat | typing.SupportsIndex = 0.001, *, gain_linear: typing.SupportsFloat | typing.SupportsIndex = 5.0, gain_angular: typing.SupportsFloat | typing.SupportsIndex = 5.0, max_linear_error: typing.SupportsFloat | typing.SupportsIndex = 0.25, max_angular_error: typing.SupportsFloat | typing.SupportsIndex = 1.0, soft_start: typing.SupportsFloat | typing.SupportsIndex = 0.1, posture: numpy.typing.ArrayLike | None = None, posture_gain: typing.SupportsFloat | typing.SupportsIndex = 0.0, posture_max_speed: typing.SupportsFloat | typing.SupportsIndex = ..., position_limits: bool = True, velocity_limits: bool = True, acceleration_limits: bool = True, jerk_limits: bool = True, recovery_speed: typing.SupportsFloat | typing.SupportsIndex = 0.1, on_limit: str = 'redistribute', exact: numpy.typing.ArrayLike | None = None, length_scale: typing.SupportsFloat | typing.SupportsIndex = 1.0, mask: numpy.typing.ArrayLike | None = None, frame: str = 'base') -> None:
+    def __init__(self, chain: Chain, method: PseudoInverse | DampedLeastSquares | AdaptiveDampedLeastSquares | SelectivelyDampedLeastSquares | JParse | JacobianProjection | JacobianSafety | JacobianSafetyProjection, dt: typing.SupportsFloat | typing.SupportsIndex = 0.001, *, gain_linear: typing.SupportsFloat | typing.SupportsIndex = 5.0, gain_angular: typing.SupportsFloat | typing.SupportsIndex = 5.0, max_linear_error: typing.SupportsFloat | typing.SupportsIndex = 0.25, max_angular_error: typing.SupportsFloat | typing.SupportsIndex = 1.0, soft_start: typing.SupportsFloat | typing.SupportsIndex = 0.1, posture: numpy.typing.ArrayLike | None = None, posture_gain: typing.SupportsFloat | typing.SupportsIndex = 0.0, posture_max_speed: typing.SupportsFloat | typing.SupportsIndex = ..., avoid: str | None = None, avoid_gain: typing.SupportsFloat | typing.SupportsIndex = 1.0, avoid_max_speed: typing.SupportsFloat | typing.SupportsIndex = 0.5, eta1: typing.SupportsFloat | typing.SupportsIndex = 0.0, eta2: typing.SupportsFloat | typing.SupportsIndex = 10.0, position_limits: bool = True, velocity_limits: bool = True, acceleration_limits: bool = True, jerk_limits: bool = True, recovery_speed: typing.SupportsFloat | typing.SupportsIndex = 0.1, on_limit: str = 'redistribute', exact: numpy.typing.ArrayLike | None = None, length_scale: typing.SupportsFloat | typing.SupportsIndex = 1.0, mask: numpy.typing.ArrayLike | None = None, frame: str = 'base') -> None:
         """
         dt: [s] from one update to the next.
         gain_linear, gain_angular: [1/s] from pose error to twist.
@@ -555,6 +555,9 @@ class Servo:
             was told that the arm moves.
         posture: (n,) nominal positions, by default those given to reset(); posture_gain [1/s];
         posture_max_speed [rad/s or m/s] caps each joint.
+        avoid: adds avoid_gain times the gradient of the manipulability ('manipulability'), or minus that of the
+            potentials Σ exp(eta1 − eta2 ψ_i) around the known singular sets ('potential'), to the posture's velocity,
+            shortened to avoid_max_speed of the fastest joint: a redundant arm keeps away from singularities.
         position_limits, …: which of the chain's limits are held, now and so that they can be held for ever.
         recovery_speed: in (0, 1], of the velocity limit, least speed of a joint that starts outside its position
             limits on its way back.
@@ -937,7 +940,7 @@ class TimeOptimal:
     Time-optimal motions of one arm with one cost, after Beck et al. (2022), by an interior-point
     method made for double integrators. `sigmaik.planning.time_optimal` is what to call.
     """
-    def __init__(self, chain: Chain, cost: JointCost | None, *, nodes: typing.SupportsInt | typing.SupportsIndex = 30, time_weight: typing.SupportsFloat | typing.SupportsIndex = 1.0, effort_weight: typing.SupportsFloat | typing.SupportsIndex = 1.0, tolerance: typing.SupportsFloat | typing.SupportsIndex = 1e-09, max_iterations: typing.SupportsInt | typing.SupportsIndex = 200, between_nodes: bool = True, restarts: bool = True) -> None:
+    def __init__(self, chain: Chain, cost: JointCost | None, *, nodes: typing.SupportsInt | typing.SupportsIndex = 30, time_weight: typing.SupportsFloat | typing.SupportsIndex = 1.0, effort_weight: typing.SupportsFloat | typing.SupportsIndex = 1.0, tolerance: typing.SupportsFloat | typing.SupportsIndex = 1e-09, max_iterations: typing.SupportsInt | typing.SupportsIndex = 500, between_nodes: bool = True, restarts: bool = True) -> None:
         """
         Raises Error where an option is out of its range.
         """

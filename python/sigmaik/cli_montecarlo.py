@@ -8,9 +8,15 @@ import contextlib
 import os
 import pathlib
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import sigmaik as sk
 
 from .console import need, terminal
 from .experiments import montecarlo as mc
+
+if TYPE_CHECKING:
+    from rich.console import Console
 
 __all__ = ["add_montecarlo"]
 
@@ -19,10 +25,12 @@ def add_montecarlo(parser: argparse.ArgumentParser) -> None:
     parser.description = (
         "Time-optimal motions between random pairs of configurations, by three objectives, with the metrics of Beck et al. "
         "(2022) beside the paper's. Writes a line for each sample as it comes: called again with the same options it goes "
-        "on from where it stopped. The last line on stdout is the file's path."
+        "on from where it stopped. The last line on stdout is the last arm's file."
     )
     standard = mc.Study()
-    parser.add_argument("--robot", default=standard.robot, help="a shipped arm (%(default)s)")
+    parser.add_argument(
+        "--robot", default="all", metavar="LIST", help="shipped arms; all: those whose singular sets are known (%(default)s)"
+    )
     parser.add_argument("--samples", type=int, default=standard.samples, metavar="N", help="pairs (%(default)s)")
     parser.add_argument("--seed", type=int, default=standard.seed, metavar="N", help="of the pairs (%(default)s)")
     parser.add_argument(
@@ -67,17 +75,34 @@ def _montecarlo(arguments: argparse.Namespace) -> int:
         need("casadi", "plan")
     if arguments.jobs < 1:
         raise ValueError("--jobs must be at least 1")
-    study = mc.Study(
-        arguments.robot,
-        arguments.samples,
-        arguments.seed,
-        tuple(arguments.objective.split(",")),
-        arguments.nodes,
-        arguments.time_weight,
-        solver=arguments.solver,
-        generic=arguments.generic,
-        between_nodes=arguments.between_nodes,
-    )
+    robots = sk.singularities.names() if arguments.robot == "all" else tuple(arguments.robot.split(","))
+    studies = [
+        mc.Study(
+            robot,
+            arguments.samples,
+            arguments.seed,
+            tuple(arguments.objective.split(",")),
+            arguments.nodes,
+            arguments.time_weight,
+            solver=arguments.solver,
+            generic=arguments.generic,
+            between_nodes=arguments.between_nodes,
+        )
+        for robot in robots
+    ]
+    with _executor(arguments) as (executor, jobs):
+        for study in studies:
+            _run(study, arguments, console, executor, jobs)
+    return 0
+
+
+def _run(
+    study: mc.Study,
+    arguments: argparse.Namespace,
+    console: Console,
+    executor: concurrent.futures.Executor | None,
+    jobs: int,
+) -> None:
     stem = f"{study.robot}-montecarlo-w{study.time_weight:g}"
     stem += "".join(f"-{word}" for word, said in (("ipopt", study.solver == "ipopt"), ("generic", study.generic)) if said)
     file = arguments.out / f"{stem}.csv"
@@ -89,10 +114,7 @@ def _montecarlo(arguments: argparse.Namespace) -> int:
 
     stderr = Console(stderr=True)
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with (
-        _executor(arguments) as (executor, jobs),
-        Progress(*columns, console=stderr, transient=True, disable=not stderr.is_terminal) as progress,
-    ):
+    with Progress(*columns, console=stderr, transient=True, disable=not stderr.is_terminal) as progress:
         task = progress.add_task(study.robot, total=study.samples)
         rows = mc.run_study(study, file, executor, lambda n: progress.advance(task, n), jobs)
 
@@ -109,7 +131,6 @@ def _montecarlo(arguments: argparse.Namespace) -> int:
         figure = plots_montecarlo.study_figure(study, rows)
         print(f"picture: {plots.save_figure(figure, arguments.out / f'{stem}.png')}")
     print(file)
-    return 0
 
 
 @contextlib.contextmanager

@@ -62,6 +62,7 @@ class InteriorPoint final : public TimeOptimal::Engine {
   static constexpr double kLeastSlack = 1e-4;  // of a constraint that the first guess breaks, as a part of its limit
   static constexpr double kToBoundary = 0.995;
   static constexpr double kBentCurvature = 0.1;
+  static constexpr double kRounding = 100.0;  // how far above the tolerance rounding may end the search
   static constexpr double kKick = 0.02;  // [rad or m]
   static constexpr int kKicks = 3;
 
@@ -667,7 +668,8 @@ TimeOptimalResult InteriorPoint<W>::solve(const TimeOptimalProblem& problem) {
       if (stepped) evaluate();
       return result(iteration + 1, gap, exact);  // the step just taken squares what was left
     }
-    if (!stepped) return result(iteration + 1, gap, false);
+    // Nothing gained: rounding hides what is left, or the merit function leads nowhere.
+    if (!stepped) return result(iteration + 1, gap, exact && gap <= kRounding * goal);
     // On to a smaller barrier: fast once Newton's method has this one, else carefully.
     const double least = 0.1 * goal / constraints_;
     if (exact && gain <= 2.0 * mu) {

@@ -76,7 +76,7 @@ def time_optimal(
     restarts: bool = True,
     solver: Solver = "sigmaik",
     tolerance: float = 1e-9,
-    max_iterations: int = 200,
+    max_iterations: int = 500,
 ) -> Trajectory:
     """A motion from start to goal in little time, at little effort, within limits, clear of singularities.
 

@@ -32,7 +32,7 @@ struct TimeOptimalOptions {
   double time_weight = 1.0;    ///< [1/s] > 0, w_t
   double effort_weight = 1.0;  ///< [s⁴/rad²] ≥ 0, w_e; > 0 where a joint has no acceleration limit
   double tolerance = 1e-9;     ///< in [1e-12, 1e-2]: what is left to gain, as a part of the objective between the ends
-  int max_iterations = 200;    ///< ≥ 1, Newton steps of a start
+  int max_iterations = 500;    ///< ≥ 1, Newton steps of a start
   bool between_nodes = true;   ///< positions keep their limits between the nodes too; false: as in the paper
   /// Where the way found still leads through what the cost marks, look on either side of it too, and keep the best.
   bool restarts = true;
