@@ -147,6 +147,10 @@ def main() -> int:
     print("\npeers", flush=True)
     subprocess.run([sys.executable, ROOT / "bench" / "peers.py", "--json", out / "peers.json"], check=True)
     peers = result["peers"] = json.loads((out / "peers.json").read_text())
+    print("\ntime-optimal motions", flush=True)
+    command = [sys.executable, ROOT / "bench" / "time_optimal.py", "--pairs", "100", "--json", out / "time_optimal.json"]
+    subprocess.run(command, check=True)
+    result["time_optimal"] = json.loads((out / "time_optimal.json").read_text())
     result["instructions"] = instructions(ROOT / "build" / "callgrind")
 
     def cpu(name: str) -> float:
@@ -180,6 +184,18 @@ def main() -> int:
     rows.append(("ConstrainedIk::step, 2 iterations, optimised / KDL's wdls",
                  f"{cpu('constrained_ik_step'):.0f} ns", cpu("velocity_kdl_wdls") / cpu("constrained_ik_step"), 0.75))  # fmt: skip
     one, two = (float(ns[f"batch/65536/{threads}"]["items_per_second"]) for threads in (1, 2))
+    for i, arm in enumerate(("Comau", "Panda", "iiwa")):
+        potentials = cpu(f"potential_gradient/{i}")
+        for other, text, goal in (
+            ("manipulability_determinant_gradient", "√det(JJᵀ) from the Jacobian", 10.0),
+            ("manipulability_closed_form_gradient", "m in closed form", 1.0),
+        ):
+            rows.append((f"{arm}: potentials + gradient / {text}, {cpu(f'{other}/{i}'):.0f} ns",
+                         f"{potentials:.0f} ns", cpu(f"{other}/{i}") / potentials, goal))  # fmt: skip
+    for plan in result["time_optimal"]:
+        ours_ms, ipopt_ms = (plan["median ms"][solver] for solver in ("sigmaik", "ipopt"))
+        rows.append((f"time-optimal with potentials, {plan['robot']} / IPOPT, {ipopt_ms:.1f} ms",
+                     f"{ours_ms:.2f} ms", plan["ratio of medians"], 2.5))  # fmt: skip
     rows.append(("solve_batch, 6×7 random, million solves / (s core)", f"{one / 1e6:.2f}", one / 1e6, 0.6))
     rows.append(("solve_batch, two threads / one", f"{two / 1e6:.2f}", two / one, 1.9))
     print(f"\n{'figure':62} {'ours':>10} {'ratio':>7} {'goal':>6}")
