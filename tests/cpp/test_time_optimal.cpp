@@ -302,6 +302,12 @@ TEST_CASE("starts and goals on a limit, and no way to go at all") {
   CHECK(violation(chain, problem, r) < 1e-9);
   CHECK(r.duration == doctest::Approx(2.3).epsilon(0.1));
 
+  problem.goal = problem.start;  // nowhere to go, from the limits
+  r = planner.solve(problem);
+  CHECK(r.status != PlanStatus::Failed);
+  CHECK(violation(chain, problem, r) < 1e-9);
+  CHECK(r.duration < 0.1);
+
   problem.goal = problem.start = JointVector::Zero(7);
   r = planner.solve(problem);
   CHECK(r.status == PlanStatus::Optimal);

@@ -18,7 +18,7 @@
 
 namespace sigmaik::planning::detail {
 
-// Constraints come in six families, one number a joint and node each:
+// Constraints come in eight families, one number a joint and node each:
 // q − lower, upper − q, hV + p, hV − p, h²A + a, h²A − a ≥ 0; and, where the positions between the nodes are to keep their
 // limits too, q + p/2 − lower, upper − q − p/2 ≥ 0: a step's parabola stays in the hull of its ends and that point.
 enum Family { kLower, kUpper, kBackward, kForward, kBrake, kPush, kLowerBetween, kUpperBetween, kFamilies };
@@ -57,13 +57,13 @@ class InteriorPoint final : public TimeOptimal::Engine {
   TimeOptimalResult solve(const TimeOptimalProblem& problem) override;
 
  private:
-  static constexpr double kLeastStep = 1e-9;   // [s]
-  static constexpr double kLeastTime = 1e-3;   // [s] times shorter than this need not be more accurate
-  static constexpr double kLeastSlack = 1e-4;  // of a constraint that the first guess breaks, as a part of its limit
-  static constexpr double kToBoundary = 0.995;
-  static constexpr double kBentCurvature = 0.1;
-  static constexpr double kRounding = 100.0;  // how far above the tolerance rounding may end the search
-  static constexpr double kKick = 0.02;  // [rad or m]
+  static constexpr double kLeastStep = 1e-9;       // [s]
+  static constexpr double kLeastTime = 1e-3;       // [s] times shorter than this need not be more accurate
+  static constexpr double kLeastSlack = 1e-4;      // of a constraint that the first guess breaks, as a part of its limit
+  static constexpr double kToBoundary = 0.995;     // the part of a slack or multiplier that a step may use up
+  static constexpr double kBentCurvature = 0.1;    // least curvature in the step, as a part of the effort's
+  static constexpr double kRounding = 100.0;       // how far above the tolerance rounding may end the search
+  static constexpr double kKick = 0.02;            // [rad or m]
   static constexpr int kKicks = 3;
 
   // 1 for each joint with a constraint of that family at node k, else 0. Ends cannot move, and the last acceleration is
@@ -143,7 +143,6 @@ InteriorPoint<W>::InteriorPoint(const Chain& chain, const JointCostPtr& cost, co
   joint_hessian_.resize(n_, n_);
 }
 
-
 template <int W>
 double InteriorPoint<W>::constraint(const Node<W>& x, int family, int i) const noexcept {
   switch (family) {
@@ -208,8 +207,6 @@ void InteriorPoint<W>::guess(const TimeOptimalProblem& problem) {
       h = std::max(h, std::sqrt(6.0 * std::abs(distance) / (m * m * acceleration_[i])) * 1.3);
       h = std::max(h, std::abs(end_[i] - start_[i]) / (m * acceleration_[i]) * 2.0);
     }
-    const double mean = 0.5 * (start_[i] + end_[i]);
-    if (std::abs(mean) > 1e-3 * std::abs(distance)) h = std::max(h, std::abs(distance / mean) / m);
   }
   // Without limits the least of w_t N h + w_e c/h⁴ is where w_t N h = 4 w_e c/h⁴.
   const double s = m * (m * m - 1.0) / 12.0;
@@ -481,12 +478,6 @@ double InteriorPoint<W>::merit(double alpha, double mu, double penalty) const no
   Row<W> product;
   for (int i = 0; i < W; ++i) product[i] = 1.0;
   double least = 1.0;
-  const auto flush = [&] {
-    for (int i = 0; i < W; ++i) {
-      logs += std::log(product[i]);
-      product[i] = 1.0;
-    }
-  };
   for (int k = 0; k < count_ - 1; ++k) {
     const Node<W>& x = node(k);
     Row<W> q, p, a;
@@ -509,16 +500,27 @@ double InteriorPoint<W>::merit(double alpha, double mu, double penalty) const no
       }
     }
     if (!(least >= 0.0)) return std::numeric_limits<double>::infinity();
-    flush();
-    if (k >= 1) {
-      if (cost_) {
-        std::copy_n(q.at, n_, joints_.data());
-        cost += cost_->value(joints_);
-      }
+    for (int i = 0; i < W; ++i) {  // one logarithm for a node's constraints of a joint
+      logs += std::log(product[i]);
+      product[i] = 1.0;
+    }
+    if (k >= 1 && cost_) {
+      std::copy_n(q.at, n_, joints_.data());
+      cost += cost_->value(joints_);
     }
   }
   return options_.time_weight * count_ * h + options_.effort_weight * effort / (h * h * h * h) + cost -
          mu * (logs + std::log(h - kLeastStep)) + penalty * missed;
+}
+
+// Shortens the step until the merit function is content with it. False where that is never.
+template <int W>
+bool InteriorPoint<W>::search_line(double mu, double penalty, double gain, double& alpha) const noexcept {
+  const double now = merit(0.0, mu, penalty), noise = 1e-12 * std::abs(now);
+  for (int trial = 0; trial < 25; ++trial, alpha *= 0.5) {
+    if (merit(alpha, mu, penalty) <= now - 1e-4 * alpha * gain + noise) return true;
+  }
+  return false;
 }
 
 template <int W>
@@ -680,16 +682,6 @@ TimeOptimalResult InteriorPoint<W>::solve(const TimeOptimalProblem& problem) {
   }
   evaluate();
   return result(options_.max_iterations, gap, false);
-}
-
-// Shortens the step until the merit function is content with it. False where that is never.
-template <int W>
-bool InteriorPoint<W>::search_line(double mu, double penalty, double gain, double& alpha) const noexcept {
-  const double now = merit(0.0, mu, penalty), noise = 1e-12 * std::abs(now);
-  for (int trial = 0; trial < 25; ++trial, alpha *= 0.5) {
-    if (merit(alpha, mu, penalty) <= now - 1e-4 * alpha * gain + noise) return true;
-  }
-  return false;
 }
 
 }  // namespace sigmaik::planning::detail

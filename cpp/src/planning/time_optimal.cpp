@@ -57,6 +57,7 @@ namespace {
 using sigmaik::detail::require;
 
 constexpr double kWorthALook = 1e-3;  // a node's cost, as a part of what time costs, that warrants other starts
+constexpr double kStandingStep = 1e-6;  // [s] of a motion that goes nowhere
 constexpr double kBend = 0.6;         // [rad or m] by which these are bent
 
 std::unique_ptr<TimeOptimal::Engine> make_engine(const Chain& chain, const JointCostPtr& cost,
@@ -153,9 +154,29 @@ JointVector TimeOptimal::way_out(const TimeOptimalResult& found) const {
   return Eigen::SelfAdjointEigenSolver<JointMatrix>(hessian).eigenvectors().col(0);
 }
 
+// To stay where one is, which has no interior where that is on a limit.
+TimeOptimalResult TimeOptimal::stand(const TimeOptimalProblem& problem) const {
+  const auto n = static_cast<std::size_t>(chain_.dof()), nodes = static_cast<std::size_t>(options_.nodes);
+  TimeOptimalResult out;
+  out.status = PlanStatus::Feasible;
+  out.starts = 1;
+  out.duration = kStandingStep * options_.nodes;
+  out.cost = options_.time_weight * out.duration + (cost_ ? options_.nodes * cost_->value(problem.start) : 0.0);
+  out.gap = out.cost;
+  for (std::size_t k = 0; k < nodes; ++k) out.q.insert(out.q.end(), problem.start.data(), problem.start.data() + n);
+  out.qdot.assign(n * nodes, 0.0);
+  out.qddot.assign(n * nodes, 0.0);
+  return out;
+}
+
 TimeOptimalResult TimeOptimal::solve(const TimeOptimalProblem& problem) {
   check(problem);
   TimeOptimalResult best = engine_->solve(problem);
+  const auto rests = [](const JointVector& velocity) { return velocity.size() == 0 || velocity.isZero(0.0); };
+  if (best.status == PlanStatus::Failed && problem.start == problem.goal && rests(problem.start_velocity) &&
+      rests(problem.goal_velocity)) {
+    best = stand(problem);
+  }
   if (!options_.restarts || !cost_ || best.status == PlanStatus::Failed) return best;
   const JointVector out = way_out(best);
   if (out.size() == 0) return best;

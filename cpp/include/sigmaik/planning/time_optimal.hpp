@@ -96,6 +96,7 @@ class TimeOptimal {
  private:
   void check(const TimeOptimalProblem& problem) const;
   JointVector way_out(const TimeOptimalResult& found) const;
+  TimeOptimalResult stand(const TimeOptimalProblem& problem) const;
 
   Chain chain_;
   JointCostPtr cost_;
