@@ -14,6 +14,8 @@ namespace sigmaik {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
+// A singular value this small beside the largest is what rounding leaves of a zero: up to 4e-15 is seen.
+constexpr double kRounding = 1e-14;
 
 // The index from σ_1 ≥ … ≥ σ_m, and its derivatives by them; these are zero where it is infinite.
 double from_sigma(Index index, double inverse_k, const Spectrum& spectrum, double* slope) noexcept {
@@ -34,7 +36,7 @@ double from_sigma(Index index, double inverse_k, const Spectrum& spectrum, doubl
     }
     case Index::ConditionNumber: {
       const double largest = spectrum.sigma(0);
-      if (!(largest / least < kInfinity)) return kInfinity;
+      if (!(least > kRounding * largest)) return kInfinity;
       slope[0] = 1.0 / least;
       slope[m - 1] += -largest / (least * least);
       if (m == 1) slope[0] = 0.0;
@@ -42,13 +44,10 @@ double from_sigma(Index index, double inverse_k, const Spectrum& spectrum, doubl
     }
     case Index::MinSingularValue: slope[m - 1] = 1.0; return least;
     default: {
+      if (!(least > kRounding * spectrum.sigma(0))) return kInfinity;
       double sum = 0.0;
       for (int i = 0; i < m; ++i) {
-        const double sigma = spectrum.sigma(i), log = std::log(sigma * sigma * inverse_k);
-        if (!std::isfinite(log)) {
-          for (int j = 0; j <= i; ++j) slope[j] = 0.0;
-          return kInfinity;
-        }
+        const double sigma = spectrum.sigma(i), log = 2.0 * std::log(sigma) + std::log(inverse_k);
         sum += log * log;
         slope[i] = 4.0 * log / sigma;
       }

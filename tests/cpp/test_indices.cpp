@@ -110,6 +110,11 @@ TEST_CASE("gradients") {
       };
       JointVector gradient(n), ignored(n);
       const double value = function.value(chain, q, gradient);
+      if (std::isinf(value)) {
+        CHECK(std::isinf(at(q)));
+        CHECK(gradient.isZero(0.0));
+        continue;
+      }
       CHECK(value == doctest::Approx(at(q)).epsilon(1e-12));
       ChainState state;
       update(chain, q, state);

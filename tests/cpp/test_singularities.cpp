@@ -251,10 +251,31 @@ TEST_CASE("recorded expressions give the same numbers") {
       const std::vector<double> got = run(sets.residual_tape(), q), minors = run(sets.manipulability_tape(), q);
       REQUIRE(static_cast<int>(got.size()) == count);
       for (int i = 0; i < count; ++i) CHECK(std::abs(got[static_cast<std::size_t>(i)] - r[static_cast<std::size_t>(i)]) < 1e-15);
+      // Many turns away, and so many that the library's sine takes over.
+      JointVector far = q;
+      for (int i = 0; i < far.size(); ++i) far[i] += random.uniform(-1.0, 1.0) * (trial % 2 ? 9e4 : 1e9);
+      sets.residuals(far, r);
+      const std::vector<double> there = run(sets.residual_tape(), far);
+      for (int i = 0; i < count; ++i) CHECK(std::abs(there[static_cast<std::size_t>(i)] - r[static_cast<std::size_t>(i)]) < 1e-14);
       double square = 0.0;
       for (const double m : minors) square += m * m;
       CHECK(std::abs(std::sqrt(square) - sets.manipulability(q)) < 1e-15);
     }
+  }
+}
+
+TEST_CASE("potentials of any height") {
+  Random random(8);
+  const SingularSets sets = SingularSets::load("kuka_lbr_iiwa_14_r820");
+  for (int trial = 0; trial < 2000; ++trial) {
+    const JointVector q = anywhere(random, 7);
+    const Potential p{.eta1 = random.uniform(-800.0, 705.0), .eta2 = random.decades(-2, 4)};
+    std::array<double, kMaxSets> psi;
+    sets.psi(q, psi);
+    double expected = 0.0;
+    for (int i = 0; i < 4; ++i) expected += std::exp(p.eta1 - p.eta2 * psi[static_cast<std::size_t>(i)]);
+    const double got = sets.potential(q, p);
+    CHECK(std::abs(got - expected) <= 1e-12 * expected + 1e-300);
   }
 }
 

@@ -69,6 +69,20 @@ def test_infinite_at_singularities_of_the_arms(name):
     assert sk.indices.manipulability(flat) == sk.indices.min_singular_value(flat) == 0.0
 
 
+@pytest.mark.parametrize(("name", "joint"), [("kuka_lbr_iiwa_14_r820", 3), ("puma560", 4), ("ur10", 4)])
+def test_infinite_up_to_rounding(name, joint):
+    arm = sk.robots.load(name)
+    rng = np.random.default_rng(0)
+    for _ in range(100):
+        q = arm.random_configuration(rng)
+        q[joint] = 0.0
+        assert sk.indices.geometry_aware(arm.jacobian(q)) == math.inf
+        assert sk.indices.condition_number(arm.jacobian(q)) == math.inf
+        assert np.array_equal(sk.indices.gradient(arm, q, "geometry_aware"), np.zeros(arm.dof))
+        q[joint] = 1e-6
+        assert sk.indices.geometry_aware(arm.jacobian(q)) < math.inf
+
+
 def test_fewer_joints_than_rows_is_singular():
     jacobian = np.random.default_rng(0).normal(size=(6, 5))
     assert sk.indices.manipulability(jacobian) == 0.0

@@ -514,3 +514,37 @@ def test_an_arm_of_few_joints_says_which_directions_it_has_not():
     solution = sk.VelocitySolver(sk.JParse()).solve(chain.jacobian([0.3, 0.7]), [0, 0, 0.1, 0, 0, 0])
     assert solution.singular.sum() == 4
     np.testing.assert_array_equal(step.singular, solution.singular)
+
+
+@pytest.mark.parametrize("avoid", ["potential", "manipulability"])
+def test_a_redundant_arm_keeps_away_from_singularities(avoid):
+    arm = sk.robots.load("kuka_lbr_iiwa_14_r820")
+    sing = sk.singularities.of(arm)
+    q = np.array([0.3, 0.1, 1.3, -1.0, 0.4, 0.9, 0.2])  # near the shoulder's set
+    servo = sk.Servo(arm, sk.JParse(), avoid=avoid, avoid_gain=1.0 if avoid == "potential" else 20.0)
+    servo.reset(q)
+    target = servo.pose
+    for _ in range(4000):
+        step = servo.update(target)
+        assert np.linalg.norm(step.pose_error) < 2e-3
+    assert sing.residuals(step.q).min() > 2.0 * sing.residuals(q).min()
+    assert sing.manipulability(step.q) > sing.manipulability(q)
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        ({"avoid": "walls"}, "avoid = 'walls'"),
+        ({"avoid": "potential", "avoid_gain": -1.0}, "avoid_gain"),
+        ({"avoid": "potential", "avoid_max_speed": 0.0}, "avoid_max_speed"),
+        ({"avoid": "potential", "eta2": -1.0}, "eta2"),
+    ],
+)
+def test_avoidance_refuses(options, text):
+    with pytest.raises(sk.Error, match=text):
+        sk.Servo(sk.robots.load("franka_panda"), sk.JParse(), **options)
+
+
+def test_avoidance_by_potential_needs_known_sets():
+    with pytest.raises(sk.Error, match="not known"):
+        sk.Servo(sk.robots.load("ufactory_xarm7"), sk.JParse(), avoid="potential")

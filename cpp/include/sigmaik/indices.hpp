@@ -3,7 +3,8 @@
 /// How far from singular: indices of a Jacobian and their gradients in the joints.
 ///
 /// All come from the singular values σ_1 ≥ … ≥ σ_m of an m×n Jacobian J; where n < m the missing ones are zero, as such a
-/// task cannot be done whole. Lengths and angles mix in J: `length_scale` [m] says how much of a length weighs as much as
+/// task cannot be done whole. Where an index is said to be infinite at a singularity, that is where σ_m ≤ 1e-14 σ_1, which
+/// is what rounding leaves of a zero. Lengths and angles mix in J: `length_scale` [m] says how much of a length weighs as much as
 /// one radian, as in VelocitySolver.
 
 #include <cstddef>
