@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import sigmaik as sk
 from sigmaik.experiments import montecarlo as mc
+from sigmaik.experiments.montecarlo_paper import PAPER
 
 STUDY = mc.Study("franka_panda", samples=20, seed=3)
 
@@ -142,7 +143,7 @@ def test_summary(expected):
     assert none.duration == mc.Mean(pytest.approx(np.mean(durations)), pytest.approx(np.std(durations)))
     assert manipulability.m_avg.mean > potential.m_avg.mean
     assert none.duration.mean < potential.duration.mean < manipulability.duration.mean
-    assert all(set(columns) == set(mc.OBJECTIVES) for columns in mc.PAPER.values())
+    assert all(set(columns) == set(mc.OBJECTIVES) for columns in PAPER.values())
 
 
 def test_joints_of_many_turns_are_cut_to_one():

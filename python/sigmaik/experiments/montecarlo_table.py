@@ -8,7 +8,8 @@ from collections.abc import Callable, Sequence
 from rich import box
 from rich.table import Table
 
-from .montecarlo import PAPER, Mean, Study, Summary
+from .montecarlo import Mean, Study, Summary
+from .montecarlo_paper import PAPER
 
 __all__ = ["study_table"]
 

@@ -6,7 +6,7 @@ import functools
 import math
 import threading
 import time
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 from sigmaik import singularities
 from sigmaik._core import Chain
 
-if TYPE_CHECKING:
-    from .time_optimal import Ends, Objective, Sets
+from .objective import Ends, Objective, Sets
 
 __all__ = ["solve"]
 

@@ -6,8 +6,7 @@ import functools
 import math
 import threading
 import time
-from dataclasses import dataclass, replace
-from typing import Literal, TypeAlias
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,14 +14,14 @@ from numpy.typing import ArrayLike, NDArray
 from sigmaik import _core, singularities
 from sigmaik._core import Chain
 
+from . import nlp
 from .clearance import Crossing, clearance
+from .objective import Avoid, Ends, Objective, Sets, Solver
 from .trajectory import Trajectory
 
 __all__ = ["ETA1", "ETA2", "Avoid", "Solver", "time_optimal"]
 
 Array = NDArray[np.float64]
-Avoid = Literal["manipulability", "potential"]
-Solver = Literal["sigmaik", "ipopt"]
 
 ETA1 = math.log(2400.0)
 """log of a potential's height (Beck et al. 2022, table 2)."""
@@ -33,25 +32,6 @@ DENSE = 10
 """Samples of a step where clearance is measured."""
 BEND = 0.6
 """[rad] by which the first guess of a second start is bent."""
-
-
-@dataclass(frozen=True)
-class Objective:
-    """All that a solver object depends on, but for the arm. Hashable: solvers are built once for each."""
-
-    avoid: Avoid | None
-    nodes: int
-    time_weight: float
-    effort_weight: float
-    avoid_weight: float
-    epsilon: float
-    eta1: float
-    eta2: float
-    generic_manipulability: bool
-    tolerance: float
-    max_iterations: int
-    between_nodes: bool
-    restarts: bool
 
 
 def time_optimal(
@@ -159,10 +139,6 @@ def time_optimal(
     return _other_sides(plan, chain, sets, objective, solver, ends)
 
 
-Ends: TypeAlias = tuple[ArrayLike, ArrayLike, ArrayLike | None, ArrayLike | None]
-Sets: TypeAlias = singularities.SingularSets | None
-
-
 def _solve(
     chain: Chain, sets: Sets, objective: Objective, solver: Solver, ends: Ends, bend: Array | None
 ) -> Trajectory:
@@ -175,8 +151,6 @@ def _solve(
         status, cost, duration = result.status, result.cost, result.duration
         iterations, starts = result.iterations, result.starts
     else:
-        from . import nlp
-
         answer = nlp.solve(chain, sets, objective, ends, bend)
         q, qdot, qddot, status, cost, duration, iterations, solve_time = answer
         starts = 1
