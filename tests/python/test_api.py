@@ -109,6 +109,8 @@ def test_the_readmes_python():
             "send": lambda *command: sent.append(command),
             "J": rng.normal(size=(6, 7)),
             "twist": rng.normal(size=6),
+            "start": sk.robots.home("franka_panda"),
+            "goal": sk.robots.home("franka_panda") + 0.3,
             "sk": sk,
         }
         path = str(sk.robots.path("ufactory_xarm7"))
