@@ -1,4 +1,5 @@
 #include <sigmaik/planning/costs.hpp>
+#include <sigmaik/planning/support_states.hpp>
 #include <sigmaik/planning/time_optimal.hpp>
 
 #include "arguments.hpp"
@@ -57,6 +58,80 @@ void bind_planning(py::module_& m) {
         return std::const_pointer_cast<JointCost>(planning::manipulability_cost(chain, weight, epsilon));
       },
       py::arg("chain"), py::arg("weight"), py::arg("epsilon"), "weight/(m(q) + ε), m from the Jacobian.");
+
+  m.def(
+      "geometry_aware_cost",
+      [](const Chain& chain, double k, double weight) {
+        return std::const_pointer_cast<JointCost>(planning::geometry_aware_cost(chain, k, weight));
+      },
+      py::arg("chain"), py::arg("k"), py::arg("weight"), "weight · ξ(q), the geometry-aware index, cut off at 2000.");
+  m.def(
+      "log_manipulability_cost",
+      [](const Chain& chain, double weight) {
+        return std::const_pointer_cast<JointCost>(planning::log_manipulability_cost(chain, weight));
+      },
+      py::arg("chain"), py::arg("weight"), "−weight · log m(q), m no less than 1e-9.");
+  m.def(
+      "sum_of_costs",
+      [](const std::vector<std::shared_ptr<JointCost>>& costs) {
+        return std::const_pointer_cast<JointCost>(planning::sum_of_costs({costs.begin(), costs.end()}));
+      },
+      py::arg("costs"), "Σ of costs for the same joints.");
+
+  m.def(
+      "spline_velocities",
+      [](const ArrayLike& q) {
+        const Array states = array_argument(q, "q", {-1, -1}, "(states, n)");
+        const int n = static_cast<int>(states.shape(1));
+        return nodes(planning::spline_velocities({states.data(), states.data() + states.size()},
+                                                 static_cast<int>(states.shape(0)), n),
+                     n);
+      },
+      py::arg("q"), "Velocities (states, n) of the natural cubic spline through q (states, n), in unit time.");
+
+  using planning::SupportPlanner;
+  using planning::SupportStates;
+  py::class_<SupportStates>(m, "SupportStates", "Answer of SupportPlanner.")
+      .def_readonly("cost", &SupportStates::cost, "Σ of the states' cost, but for the ends'.")
+      .def_readonly("distance", &SupportStates::distance, "‖q − μ‖² in the inverse of the prior's covariance.")
+      .def_readonly("iterations", &SupportStates::iterations)
+      .def_readonly("converged", &SupportStates::converged, "Whether it stopped by its own rule.")
+      .def(
+          "states",
+          [](const SupportStates& s, int n) { return nodes(s.q, n); },
+          py::arg("dof"), "q (states, n).");
+  py::class_<SupportPlanner>(m, "SupportPlanner",
+                             "Motions as support states under a Gaussian-process prior (Petrović et al.).\n"
+                             "`sigmaik.planning.stochastic` and `gradient` are what to call.")
+      .def(py::init([](const Chain& chain, const std::shared_ptr<JointCost>& cost, int states) {
+             return SupportPlanner(chain, cost, states);
+           }),
+           py::arg("chain"), py::arg("cost"), py::arg("states"))
+      .def(
+          "gradient",
+          [](SupportPlanner& p, const ArrayLike& start, const ArrayLike& goal, double prior_weight, int max_iterations,
+             double tolerance, const std::optional<SupportStates>& guess) {
+            const int n = p.chain().dof();
+            const JointVector from = joint_argument(start, "start", n), to = joint_argument(goal, "goal", n);
+            py::gil_scoped_release release;
+            return p.gradient(from, to, {p.states(), prior_weight, max_iterations, tolerance},
+                              guess ? guess->q : std::vector<double>{});
+          },
+          py::arg("start"), py::arg("goal"), py::kw_only(), py::arg("prior_weight"), py::arg("max_iterations"),
+          py::arg("tolerance"), py::arg("guess") = py::none())
+      .def(
+          "stochastic",
+          [](SupportPlanner& p, const ArrayLike& start, const ArrayLike& goal, int samples, int max_iterations,
+             double deviation, double decay, double temperature, double prior_weight, double tolerance, std::uint64_t seed) {
+            const int n = p.chain().dof();
+            const JointVector from = joint_argument(start, "start", n), to = joint_argument(goal, "goal", n);
+            py::gil_scoped_release release;
+            return p.stochastic(from, to, {p.states(), samples, max_iterations, deviation, decay, temperature, prior_weight,
+                                           tolerance, seed});
+          },
+          py::arg("start"), py::arg("goal"), py::kw_only(), py::arg("samples"), py::arg("max_iterations"),
+          py::arg("deviation"), py::arg("decay"), py::arg("temperature"), py::arg("prior_weight"), py::arg("tolerance"),
+          py::arg("seed"));
 
   py::class_<TimeOptimalResult>(m, "TimeOptimalResult", "Answer of TimeOptimal.solve().")
       .def_property_readonly("status", [](const TimeOptimalResult& r) { return std::string(to_string(r.status)); },

@@ -2,11 +2,12 @@
 The compiled part of sigmaik. Import sigmaik instead.
 """
 from __future__ import annotations
+import collections.abc
 import enum
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['AdaptiveDampedLeastSquares', 'AnalyticBranch', 'AnalyticIk', 'Chain', 'ConstrainedIk', 'ConstrainedIkStep', 'DEFAULT_SCALE', 'DampedLeastSquares', 'Dynamics', 'Error', 'JParse', 'JacobianProjection', 'JacobianSafety', 'JacobianSafetyProjection', 'JointCost', 'JointLimits', 'LeastSquaresSolution', 'PseudoInverse', 'SelectivelyDampedLeastSquares', 'Servo', 'ServoStep', 'SingularSets', 'Solution', 'Spectrum', 'Status', 'TimeOptimal', 'TimeOptimalResult', 'VelocitySolver', 'evaluate_index', 'index_of_jacobian', 'known_singular_sets', 'least_squares', 'load_singular_sets', 'manipulability_cost', 'pose_error', 'potential_cost', 'reference_scale', 'rotation_exp', 'rotation_log', 'singular_sets_of', 'solve_batch']
+__all__: list[str] = ['AdaptiveDampedLeastSquares', 'AnalyticBranch', 'AnalyticIk', 'Chain', 'ConstrainedIk', 'ConstrainedIkStep', 'DEFAULT_SCALE', 'DampedLeastSquares', 'Dynamics', 'Error', 'JParse', 'JacobianProjection', 'JacobianSafety', 'JacobianSafetyProjection', 'JointCost', 'JointLimits', 'LeastSquaresSolution', 'PseudoInverse', 'SelectivelyDampedLeastSquares', 'Servo', 'ServoStep', 'SingularSets', 'Solution', 'Spectrum', 'Status', 'SupportPlanner', 'SupportStates', 'TimeOptimal', 'TimeOptimalResult', 'VelocitySolver', 'evaluate_index', 'geometry_aware_cost', 'index_of_jacobian', 'known_singular_sets', 'least_squares', 'load_singular_sets', 'log_manipulability_cost', 'manipulability_cost', 'pose_error', 'potential_cost', 'reference_scale', 'rotation_exp', 'rotation_log', 'singular_sets_of', 'solve_batch', 'spline_velocities', 'sum_of_costs']
 class Error(ValueError):
     """
     What set-up and checked calls refuse. The text carries the facts.
@@ -897,6 +898,43 @@ class JointCost:
         """
         Number of joints, n.
         """
+class SupportStates:
+    """
+    Answer of SupportPlanner.
+    """
+    def states(self, dof: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        q (states, n).
+        """
+    @property
+    def converged(self) -> bool:
+        """
+        Whether it stopped by its own rule.
+        """
+    @property
+    def cost(self) -> float:
+        """
+        Σ of the states' cost, but for the ends'.
+        """
+    @property
+    def distance(self) -> float:
+        """
+        ‖q − μ‖² in the inverse of the prior's covariance.
+        """
+    @property
+    def iterations(self) -> int:
+        ...
+class SupportPlanner:
+    """
+    Motions as support states under a Gaussian-process prior (Petrović et al.).
+    `sigmaik.planning.stochastic` and `gradient` are what to call.
+    """
+    def __init__(self, chain: Chain, cost: JointCost, states: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def gradient(self, start: numpy.typing.ArrayLike, goal: numpy.typing.ArrayLike, *, prior_weight: typing.SupportsFloat | typing.SupportsIndex, max_iterations: typing.SupportsInt | typing.SupportsIndex, tolerance: typing.SupportsFloat | typing.SupportsIndex, guess: SupportStates | None = None) -> SupportStates:
+        ...
+    def stochastic(self, start: numpy.typing.ArrayLike, goal: numpy.typing.ArrayLike, *, samples: typing.SupportsInt | typing.SupportsIndex, max_iterations: typing.SupportsInt | typing.SupportsIndex, deviation: typing.SupportsFloat | typing.SupportsIndex, decay: typing.SupportsFloat | typing.SupportsIndex, temperature: typing.SupportsFloat | typing.SupportsIndex, prior_weight: typing.SupportsFloat | typing.SupportsIndex, tolerance: typing.SupportsFloat | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> SupportStates:
+        ...
 class TimeOptimalResult:
     """
     Answer of TimeOptimal.solve().
@@ -954,6 +992,10 @@ def evaluate_index(chain: Chain, q: numpy.typing.ArrayLike, index: str, k: numpy
     """
     Values () or (B,) and gradients (n,) or (B, n) at q (n,) or (B, n).
     """
+def geometry_aware_cost(chain: Chain, k: typing.SupportsFloat | typing.SupportsIndex, weight: typing.SupportsFloat | typing.SupportsIndex) -> JointCost:
+    """
+    weight · ξ(q), the geometry-aware index, cut off at 2000.
+    """
 def index_of_jacobian(J: numpy.typing.ArrayLike, index: str, k: numpy.typing.ArrayLike = 6.0, length_scale: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> float | numpy.typing.NDArray[numpy.float64]:
     """
     An index of J (m, n), or (B,) of J (B, m, n).
@@ -971,6 +1013,10 @@ def least_squares(A: numpy.typing.ArrayLike | None = None, b: numpy.typing.Array
     """
 def load_singular_sets(name: str) -> SingularSets:
     ...
+def log_manipulability_cost(chain: Chain, weight: typing.SupportsFloat | typing.SupportsIndex) -> JointCost:
+    """
+    −weight · log m(q), m no less than 1e-9.
+    """
 @typing.overload
 def manipulability_cost(sets: SingularSets, weight: typing.SupportsFloat | typing.SupportsIndex, epsilon: typing.SupportsFloat | typing.SupportsIndex) -> JointCost:
     """
@@ -1013,6 +1059,14 @@ def solve_batch(method: PseudoInverse | DampedLeastSquares | AdaptiveDampedLeast
 
     Each is solved as by a fresh VelocitySolver, so order and number of threads do not change the answers.
     Raises Error where a shape is wrong or an entry is not finite.
+    """
+def spline_velocities(q: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Velocities (states, n) of the natural cubic spline through q (states, n), in unit time.
+    """
+def sum_of_costs(costs: collections.abc.Sequence[JointCost]) -> JointCost:
+    """
+    Σ of costs for the same joints.
     """
 DEFAULT_SCALE: float = 6.0
 __version__: str

@@ -1,6 +1,8 @@
 #include <sigmaik/planning/costs.hpp>
 
+#include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include <sigmaik/indices.hpp>
 
@@ -73,6 +75,24 @@ class ClosedFormCost final : public InverseCost {
   SingularSets sets_;
 };
 
+// The Hessian (n, n), symmetric, by differences of slope(q, gradient).
+template <typename Slope>
+void difference_hessian(const JointRef& q, JointMatrix& hessian, Slope slope) noexcept {
+  constexpr double kStep = 1e-5;  // [rad or m]
+  const Eigen::Index n = q.size();
+  JointVector moved = q, up(n), down(n);
+  hessian.resize(n, n);
+  for (Eigen::Index k = 0; k < n; ++k) {
+    moved[k] = q[k] + kStep;
+    slope(moved, up);
+    moved[k] = q[k] - kStep;
+    slope(moved, down);
+    moved[k] = q[k];
+    hessian.col(k) = (up - down) / (2.0 * kStep);
+  }
+  hessian = (0.5 * (hessian + hessian.transpose())).eval();
+}
+
 class GenericCost final : public InverseCost {
  public:
   GenericCost(const Chain& chain, double weight, double epsilon)
@@ -84,26 +104,115 @@ class GenericCost final : public InverseCost {
     return invert(index_.value(state.jacobian));
   }
   double model(const JointRef& q, JointVector& gradient, JointMatrix& hessian) const noexcept override {
-    constexpr double kStep = 1e-5;  // [rad or m]
-    const int n = dof();
     const double m = index_.value(chain_, q, gradient);
-    JointVector moved = q, up(n), down(n);
-    hessian.resize(n, n);
-    for (int k = 0; k < n; ++k) {
-      moved[k] = q[k] + kStep;
-      index_.value(chain_, moved, up);
-      moved[k] = q[k] - kStep;
-      index_.value(chain_, moved, down);
-      moved[k] = q[k];
-      hessian.col(k) = (up - down) / (2.0 * kStep);
-    }
-    hessian = (0.5 * (hessian + hessian.transpose())).eval();
+    difference_hessian(q, hessian, [this](const JointVector& x, JointVector& g) { index_.value(chain_, x, g); });
     return invert(m, gradient, hessian);
   }
 
  private:
   Chain chain_;
   IndexFunction index_;
+};
+
+// weight · f(index), by value and slope of f.
+class IndexCost : public JointCost {
+ public:
+  IndexCost(const Chain& chain, const IndexFunction& index, double weight) : chain_(chain), index_(index), weight_(weight) {
+    require_positive("weight", weight);
+  }
+  int dof() const noexcept override { return chain_.dof(); }
+  double value(const JointRef& q) const noexcept override {
+    ChainState state;
+    update(chain_, q, state);
+    double ignored;
+    return weight_ * shape(index_.value(state.jacobian), ignored);
+  }
+  double slope(const JointRef& q, JointVector& gradient) const noexcept override {
+    double factor;
+    const double value = shape(index_.value(chain_, q, gradient), factor);
+    gradient *= weight_ * factor;
+    return weight_ * value;
+  }
+  double model(const JointRef& q, JointVector& gradient, JointMatrix& hessian) const noexcept override {
+    difference_hessian(q, hessian, [this](const JointVector& x, JointVector& g) { slope(x, g); });
+    return slope(q, gradient);
+  }
+
+ protected:
+  virtual double shape(double index, double& slope) const noexcept = 0;
+
+ private:
+  Chain chain_;
+  IndexFunction index_;
+  double weight_;
+};
+
+class GeometryAwareCost final : public IndexCost {
+ public:
+  GeometryAwareCost(const Chain& chain, double k, double weight, double most)
+      : IndexCost(chain, IndexFunction(Index::GeometryAware, {.k = k}), weight), most_(most) {
+    require_positive("most", most);
+  }
+
+ private:
+  double shape(double index, double& slope) const noexcept override {
+    slope = index < most_ ? 1.0 : 0.0;
+    return std::min(index, most_);
+  }
+  double most_;
+};
+
+class LogManipulabilityCost final : public IndexCost {
+ public:
+  LogManipulabilityCost(const Chain& chain, double weight)
+      : IndexCost(chain, IndexFunction(Index::Manipulability), weight) {}
+
+ private:
+  double shape(double index, double& slope) const noexcept override {
+    constexpr double kLeast = 1e-9;
+    slope = index > kLeast ? -1.0 / index : 0.0;
+    return -std::log(std::max(index, kLeast));
+  }
+};
+
+class SumCost final : public JointCost {
+ public:
+  explicit SumCost(std::vector<JointCostPtr> costs) : costs_(std::move(costs)) {
+    require(!costs_.empty(), "there is no cost to add up");
+    for (const JointCostPtr& cost : costs_) {
+      require(cost != nullptr, "a cost is null");
+      require(cost->dof() == dof(), "costs are for ", dof(), " and for ", cost->dof(), " joints");
+    }
+  }
+  int dof() const noexcept override { return costs_.front()->dof(); }
+  double value(const JointRef& q) const noexcept override {
+    double sum = 0.0;
+    for (const JointCostPtr& cost : costs_) sum += cost->value(q);
+    return sum;
+  }
+  double slope(const JointRef& q, JointVector& gradient) const noexcept override {
+    JointVector g(dof());
+    double sum = costs_.front()->slope(q, gradient);
+    for (std::size_t i = 1; i < costs_.size(); ++i) {
+      sum += costs_[i]->slope(q, g);
+      gradient += g;
+    }
+    return sum;
+  }
+  double model(const JointRef& q, JointVector& gradient, JointMatrix& hessian) const noexcept override {
+    JointVector g(dof());
+    JointMatrix h(dof(), dof());
+    double sum = costs_.front()->model(q, gradient, hessian);
+    for (std::size_t i = 1; i < costs_.size(); ++i) {
+      sum += costs_[i]->model(q, g, h);
+      gradient += g;
+      hessian += h;
+    }
+    return sum;
+  }
+
+ private:
+  std::vector<JointCostPtr> costs_;
 };
 
 }  // namespace
@@ -118,6 +227,19 @@ JointCostPtr manipulability_cost(const SingularSets& sets, double weight, double
 
 JointCostPtr manipulability_cost(const Chain& chain, double weight, double epsilon) {
   return std::make_shared<GenericCost>(chain, weight, epsilon);
+}
+
+JointCostPtr geometry_aware_cost(const Chain& chain, double k, double weight, double most) {
+  return std::make_shared<GeometryAwareCost>(chain, k, weight, most);
+}
+
+JointCostPtr log_manipulability_cost(const Chain& chain, double weight) {
+  return std::make_shared<LogManipulabilityCost>(chain, weight);
+}
+
+JointCostPtr sum_of_costs(std::vector<JointCostPtr> costs) {
+  if (costs.size() == 1 && costs.front()) return costs.front();
+  return std::make_shared<SumCost>(std::move(costs));
 }
 
 }  // namespace sigmaik::planning

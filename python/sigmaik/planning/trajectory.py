@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 class Trajectory:
     """Joint positions over time, N samples of n joints, and how they were found.
 
-    Acceleration is constant from one sample to the next, so that `sample` is exact between them. A failed plan has no
+    Between samples acceleration is constant, or, where `cubic`, changes evenly: `sample` is exact. A failed plan has no
     samples: its arrays are empty.
     """
 
@@ -29,7 +29,7 @@ class Trajectory:
     qdot: Array = field(repr=False)
     """(N, n) [rad/s or m/s]"""
     qddot: Array = field(repr=False)
-    """(N, n) [rad/s² or m/s²], of the step that begins at the sample; zero in the last row."""
+    """(N, n) [rad/s² or m/s²], of the step that begins at the sample, zero in the last row; where `cubic`, at the sample."""
     duration: float
     """[s]; nan where the plan failed. See the planner for what it counts."""
     status: str
@@ -42,6 +42,8 @@ class Trajectory:
     """Steps of the optimiser, of all starts."""
     starts: int = 1
     """First guesses tried."""
+    cubic: bool = False
+    """Whether positions are cubic between samples, as the prior of a Gaussian process has them, or quadratic."""
     clearance: Clearance | None = field(default=None, repr=False)
     """How near singularities it comes, between the samples too; None where the plan failed."""
 
@@ -55,4 +57,12 @@ class Trajectory:
         k = np.clip(np.searchsorted(self.t, times, side="right") - 1, 0, self.t.size - 1)
         s = (np.clip(times, self.t[0], self.t[-1]) - self.t[k])[:, None]
         q, qdot, qddot = self.q[k], self.qdot[k], self.qddot[k]
-        return q + s * (qdot + 0.5 * s * qddot), qdot + s * qddot, qddot.copy()
+        if not self.cubic:
+            return q + s * (qdot + 0.5 * s * qddot), qdot + s * qddot, qddot.copy()
+        after = np.minimum(k + 1, self.t.size - 1)
+        jerk = (self.qddot[after] - qddot) / np.maximum(self.t[after] - self.t[k], 1e-300)[:, None]
+        return (
+            q + s * (qdot + s * (0.5 * qddot + s * jerk / 6.0)),
+            qdot + s * (qddot + 0.5 * s * jerk),
+            qddot + s * jerk,
+        )

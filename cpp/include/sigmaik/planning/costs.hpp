@@ -2,6 +2,8 @@
 /// \file costs.hpp
 /// Costs that keep a plan away from singularities (Beck et al. 2022, section 3).
 
+#include <vector>
+
 #include <sigmaik/chain.hpp>
 #include <sigmaik/planning/joint_cost.hpp>
 #include <sigmaik/singularities.hpp>
@@ -19,5 +21,18 @@ JointCostPtr manipulability_cost(const SingularSets& sets, double weight = 1e2, 
 /// The same for any chain, from its Jacobian. The Hessian is by differences of the gradient.
 /// \throws Error where a parameter is out of its range
 JointCostPtr manipulability_cost(const Chain& chain, double weight = 1e2, double epsilon = 1e-6);
+
+/// weight · ξ(q), the geometry-aware index with Σ = kI (Petrović et al., eq. 12), cut off at `most`: it is infinite at a
+/// singularity, where it would drown everything else, and points nowhere.
+/// \throws Error where a parameter is out of its range
+JointCostPtr geometry_aware_cost(const Chain& chain, double k, double weight = 1.0, double most = 2000.0);
+
+/// −weight · log m(q), m = √det(JJᵀ) from the Jacobian, with m no less than 1e-9.
+/// \throws Error where a parameter is out of its range
+JointCostPtr log_manipulability_cost(const Chain& chain, double weight = 1.0);
+
+/// Σ of costs for the same joints.
+/// \throws Error where there is none, or their numbers of joints differ
+JointCostPtr sum_of_costs(std::vector<JointCostPtr> costs);
 
 }  // namespace sigmaik::planning

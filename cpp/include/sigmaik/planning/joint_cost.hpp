@@ -19,6 +19,12 @@ class JointCost {
   /// Cost at q (n,), finite for finite q. Real time.
   virtual double value(const JointRef& q) const noexcept = 0;
 
+  /// Cost, with gradient (n,). Real time.
+  virtual double slope(const JointRef& q, JointVector& gradient) const noexcept {
+    JointMatrix hessian(dof(), dof());
+    return model(q, gradient, hessian);
+  }
+
   /// Cost, with gradient (n,) and Hessian (n, n), symmetric. Real time.
   virtual double model(const JointRef& q, JointVector& gradient, JointMatrix& hessian) const noexcept = 0;
 };

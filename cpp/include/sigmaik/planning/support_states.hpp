@@ -1,0 +1,79 @@
+#pragma once
+/// \file support_states.hpp
+/// Motions as support states under a Gaussian-process prior, moved so that a cost of their states falls (Petrović et al.):
+/// by its gradient, or by samples.
+///
+/// N + 1 states, evenly in unit time, the first and last fixed. The prior is that of white noise on acceleration (a constant
+/// velocity model, eqs. 7 to 9) for every joint, conditioned on both end positions, about the straight line μ: its covariance,
+/// scaled to a largest variance of 1, is K̄ ∝ k(s, u) = s(1 − u)(2u − s² − u²)/6 for s ≤ u. Between the states the prior's mean
+/// is the natural cubic spline through them.
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include <sigmaik/chain.hpp>
+#include <sigmaik/planning/joint_cost.hpp>
+
+namespace sigmaik::planning {
+
+/// A motion: (states, n) in C order, ends included.
+struct SupportStates {
+  std::vector<double> q;
+  double cost = 0.0;      ///< of the states between the ends
+  double distance = 0.0;  ///< ‖q − μ‖² in K̄⁻¹
+  int iterations = 0;
+  bool converged = false;  ///< stopped by its own rule, not by the number of iterations
+};
+
+struct GradientOptions {
+  int states = 21;            ///< N + 1, 3 to 1000
+  double prior_weight = 10.0; ///< > 0: what ‖q − μ‖² in K̄⁻¹ weighs against the cost
+  int max_iterations = 100;   ///< ≥ 1
+  double tolerance = 1e-4;    ///< ≥ 0: stops where an iteration gains less than this part of the objective
+};
+
+struct StochasticOptions {
+  int states = 21;             ///< N + 1, 3 to 1000
+  int samples = 10;            ///< ≥ 2, of an iteration
+  int max_iterations = 30;     ///< ≥ 1
+  double deviation = 0.5;      ///< [rad or m] > 0, of the samples half-way
+  double decay = 0.98;         ///< in (0, 1]: of the deviation, from one iteration to the next
+  double temperature = 0.1;    ///< > 0: λ of the weights exp(−(G − G_min)/(λ (G_max − G_min))) (15), normalised
+  double prior_weight = 10.0;  ///< ≥ 0: as for the gradient; it keeps joints that the cost does not see from drifting
+  double tolerance = 1e-3;     ///< ≥ 0: stops where eight iterations together gain less than this part of the objective
+  std::uint64_t seed = 0;
+};
+
+/// Plans for one arm and one cost, with the covariance's factors made once. One a thread.
+class SupportPlanner {
+ public:
+  /// \throws Error where the number of states is out of its range, or the cost is for another number of joints
+  SupportPlanner(Chain chain, JointCostPtr cost, int states);
+  ~SupportPlanner();
+  SupportPlanner(SupportPlanner&&) noexcept;
+  SupportPlanner& operator=(SupportPlanner&&) noexcept;
+
+  /// Minimises Σ cost(q_i) + w ‖q − μ‖² in K̄⁻¹ by L-BFGS in x, q = μ + C x, K̄ = C Cᵀ, from `guess` (states, n), or from the
+  /// straight line where that is empty. States are kept within the limits by projection.
+  /// \throws Error where an option is out of its range, or an end outside the limits
+  SupportStates gradient(const JointVector& start, const JointVector& goal, const GradientOptions& options,
+                         const std::vector<double>& guess = {});
+
+  /// Moves the states by the mean of samples about them, weighted by their cost (14) to (16), and returns the best that was
+  /// met. The same for the same seed.
+  /// \throws Error as gradient()
+  SupportStates stochastic(const JointVector& start, const JointVector& goal, const StochasticOptions& options);
+
+  int states() const noexcept;
+  const Chain& chain() const noexcept;
+
+ private:
+  struct Work;
+  std::unique_ptr<Work> work_;
+};
+
+/// Velocities (states, n) of the natural cubic spline through (states, n), in unit time.
+std::vector<double> spline_velocities(const std::vector<double>& q, int states, int dof);
+
+}  // namespace sigmaik::planning
