@@ -1,4 +1,4 @@
-"""The command `sigmaik`: reach, limits, axis5 and montecarlo (experiments), robots, info.
+"""The command `sigmaik`: reach, limits, axis5, montecarlo and reaching (experiments), robots, info.
 
 Everything that is asked of a file or an option and is wrong there ends with one line on stderr and exit code
 2.
@@ -22,6 +22,7 @@ import sigmaik as sk
 
 from . import experiments as ex
 from .cli_montecarlo import add_montecarlo
+from .cli_reaching import add_reaching
 from .console import MissingPackage, need, terminal
 from .experiments import axis5
 from .experiments.reach import load_arm
@@ -65,6 +66,7 @@ def _parser() -> argparse.ArgumentParser:
     add_montecarlo(
         commands.add_parser("montecarlo", help="random motions, clear of singularities or not: what it costs and brings")
     )
+    add_reaching(commands.add_parser("reaching", help="motions along a good geometry-aware index, and others"))
     robots = commands.add_parser("robots", help="list the arms that are shipped, and their paths")
     robots.set_defaults(run=_robots)
     _add_info(commands.add_parser("info", help="an arm's joints, limits, reach and singular values"))
