@@ -24,7 +24,8 @@
 ///     dynamics.hpp         Dynamics: mass matrix, Coriolis, gravity, by KDL (not included)
 ///     constrained_ik.hpp   ConstrainedIk: a pose exactly in part, the rest as limits allow; time scaling (not included)
 ///     planning/time_optimal.hpp  TimeOptimal: motions within limits, away from what a cost marks (not included)
-///     planning/costs.hpp         costs for it: potentials, manipulability (not included)
+///     planning/support_states.hpp  SupportPlanner: smooth motions along which a cost is low, by gradient or samples
+///     planning/costs.hpp         costs for both: potentials, manipulability, geometry-aware index (not included)
 ///
 /// Set-up throws Error. Calls marked "real time" are noexcept, bounded, and touch neither heap nor lock.
 
