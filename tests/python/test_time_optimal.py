@@ -279,3 +279,55 @@ def test_refusals(change, text):
 def test_potential_needs_known_sets():
     with pytest.raises(ValueError, match="not known; .*franka_panda"):
         time_optimal(sk.robots.load("ur10"), np.zeros(6), np.ones(6), "potential")
+
+
+def test_saved_and_loaded(tmp_path):
+    arm = sk.robots.load("kuka_lbr_iiwa_14_r820")
+    for planner in (time_optimal, sk.planning.gradient):
+        for start, goal in pairs(arm, 4, 8):
+            plan = planner(arm, start, goal)
+            again = sk.planning.Trajectory.load(plan.save(tmp_path / "plan.npz"))
+            for name in ("t", "q", "qdot", "qddot"):
+                assert np.array_equal(getattr(plan, name), getattr(again, name))
+            assert (again.status, again.cost, again.duration, again.cubic) == (
+                plan.status,
+                plan.cost,
+                plan.duration,
+                plan.cubic,
+            )
+            assert again.clearance.names == plan.clearance.names
+            assert np.array_equal(again.clearance.psi, plan.clearance.psi)
+            assert [c.name for c in again.clearance.crossings] == [c.name for c in plan.clearance.crossings]
+    np.savez(tmp_path / "other.npz", x=np.zeros(3))
+    (tmp_path / "text.npz").write_text("text")
+    for other in ("other.npz", "text.npz"):
+        with pytest.raises(ValueError, match="not the file of a trajectory"):
+            sk.planning.Trajectory.load(tmp_path / other)
+
+
+def test_retimed():
+    arm = sk.robots.load("franka_panda")
+    start, goal = pairs(arm, 1)[0]
+    for plan in (time_optimal(arm, start, goal), sk.planning.gradient(arm, start, goal)):
+        slow = plan.retimed(3.0 * plan.duration)
+        t = np.linspace(0.0, plan.duration, 100)
+        for got, expected, f in zip(slow.sample(3.0 * t), plan.sample(t), (1.0, 3.0, 9.0), strict=True):
+            assert got == pytest.approx(expected / f, abs=1e-12)
+        assert slow.clearance.min_manipulability == plan.clearance.min_manipulability
+        with pytest.raises(ValueError, match="duration"):
+            plan.retimed(0.0)
+
+
+def test_played_through_the_servo():
+    # The plan's positions as poses, at 1 kHz: the servo follows within its gains, and breaks no limit.
+    arm = sk.robots.load("franka_panda")
+    start = sk.robots.home("franka_panda")
+    goal = start + np.array([0.4, 0.2, -0.3, 0.2, 0.3, -0.2, 0.1])
+    plan = time_optimal(arm, start, goal, time_weight=10.0)
+    servo = sk.Servo(arm, sk.JParse(), dt=1e-3, gain_linear=20.0, gain_angular=20.0, posture=goal, posture_gain=1.0)
+    servo.reset(start)
+    t = np.arange(0.0, plan.duration + 1.0, 1e-3)
+    for pose in arm.pose(plan.sample(t)[0]):
+        step = servo.update(pose)
+        assert np.all(np.abs(step.qdot) <= arm.limits.velocity)
+    assert np.linalg.norm(step.pose_error) < 1e-4

@@ -19,37 +19,19 @@ import csv
 import dataclasses
 import io
 import json
-import os
 import pathlib
-import tempfile
 from collections.abc import Callable, Iterable, Sequence
 from typing import BinaryIO, Literal
 
 import numpy as np
 
 import sigmaik as sk
+from sigmaik.files import write_atomically
 
 from .reach import Run
 from .summary import Summary
 
 __all__ = ["save_run", "save_summary", "write_atomically"]
-
-
-def write_atomically(file: pathlib.Path, write: Callable[[BinaryIO], None]) -> pathlib.Path:
-    """Writes a file beside its place and moves it there, so that nobody ever sees half of it."""
-    file.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=file.parent, prefix=f".{file.name}.")
-    try:
-        with os.fdopen(handle, "wb") as stream:
-            write(stream)
-        umask = os.umask(0)
-        os.umask(umask)
-        os.chmod(name, 0o666 & ~umask)  # mkstemp's files are for their owner only
-        os.replace(name, file)
-    except BaseException:
-        os.unlink(name)
-        raise
-    return file
 
 
 def save_run(run: Run, file: str | pathlib.Path, form: Literal["npz", "csv"] = "npz") -> pathlib.Path:

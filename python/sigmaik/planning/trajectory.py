@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import json
+import pathlib
+from dataclasses import asdict, dataclass, field, fields, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .clearance import Clearance
+from sigmaik.files import write_atomically
+
+from .clearance import Clearance, Crossing
 
 __all__ = ["Trajectory"]
 
@@ -66,3 +70,63 @@ class Trajectory:
             qdot + s * (qddot + 0.5 * s * jerk),
             qddot + s * jerk,
         )
+
+    def retimed(self, duration: float) -> Trajectory:
+        """The same path in another time [s], faster or slower everywhere by the same factor."""
+        if self.t.size == 0:
+            raise ValueError(f"this trajectory is empty: its plan {self.status}")
+        if not (np.isfinite(duration) and duration > 0.0):
+            raise ValueError(f"duration = {duration} must be finite and greater than 0")
+        f = duration / self.duration
+        near = self.clearance
+        if near is not None:
+            crossings = tuple(replace(c, t=c.t * f) for c in near.crossings)
+            near = replace(near, t=near.t * f, crossings=crossings)
+        return replace(
+            self,
+            t=self.t * f,
+            qdot=self.qdot / f,
+            qddot=self.qddot / f**2,
+            duration=duration,
+            clearance=near,
+        )
+
+    def save(self, file: str | pathlib.Path) -> pathlib.Path:
+        """Writes an npz file that numpy.load reads without pickles, whole or not at all. Returns its path."""
+        arrays: dict[str, Array] = {name: getattr(self, name) for name in _ARRAYS}
+        about = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in (*_ARRAYS, "clearance")}
+        near = self.clearance
+        if near is not None:
+            arrays |= {"clearance_t": near.t, "clearance_manipulability": near.manipulability, "clearance_psi": near.psi}
+            about["clearance"] = {
+                "names": near.names,
+                "crossings": [{**asdict(c), "q": c.q.tolist()} for c in near.crossings],
+            }
+        text = np.array(json.dumps(about))
+        return write_atomically(
+            pathlib.Path(file), lambda stream: np.savez_compressed(stream, about=text, **arrays)  # type: ignore[arg-type]
+        )
+
+    @staticmethod
+    def load(file: str | pathlib.Path) -> Trajectory:
+        """What `save` has written. ValueError where the file is something else."""
+        try:
+            with np.load(file, allow_pickle=False) as data:
+                about = json.loads(str(data["about"]))
+                arrays = {name: data[name] for name in _ARRAYS}
+                near = about.pop("clearance", None)
+                if near is not None:
+                    crossings = tuple(Crossing(**{**c, "q": np.array(c["q"])}) for c in near["crossings"])
+                    near = Clearance(
+                        data["clearance_t"],
+                        data["clearance_manipulability"],
+                        tuple(near["names"]),
+                        data["clearance_psi"],
+                        crossings,
+                    )
+            return Trajectory(**arrays, **about, clearance=near)
+        except (KeyError, TypeError, ValueError) as error:
+            raise ValueError(f"{file} is not the file of a trajectory") from error
+
+
+_ARRAYS = ("t", "q", "qdot", "qddot")
