@@ -8,6 +8,7 @@
 #include <sigmaik/spectrum.hpp>
 
 #include "message.hpp"
+#include "quasi_random.hpp"
 #include "ranges.hpp"
 
 namespace sigmaik {
@@ -149,9 +150,8 @@ double geometry_aware(const TaskJacobianRef& jacobian, double k) noexcept {
 
 double reference_scale(const Chain& chain, double length_scale) {
   const int n = chain.dof();
-  const JointLimits& limits = chain.limits();
-  const JointVector low = limits.lower.unaryExpr([](double x) { return std::isfinite(x) ? x : -M_PI; });
-  const JointVector high = limits.upper.unaryExpr([](double x) { return std::isfinite(x) ? x : M_PI; });
+  const detail::QuasiRandom configurations(chain);
+  const JointVector &low = configurations.lower, &high = configurations.upper;
   detail::require(std::isfinite(length_scale) && length_scale > 0.0, "length_scale = ", length_scale,
                   " must be finite and greater than 0");
   // σ_1² and its gradient.
@@ -173,13 +173,10 @@ double reference_scale(const Chain& chain, double length_scale) {
     }
     return spectrum.sigma(0) * spectrum.sigma(0);
   };
-  // Points of the additive recurrence with the generalised golden ratio φ, φ^{n+1} = φ + 1.
-  double phi = 1.5;
-  for (int i = 0; i < 60; ++i) phi = std::pow(1.0 + phi, 1.0 / (n + 1.0));
   JointVector best = 0.5 * (low + high), q(n), gradient(n);
   double most = largest(best, nullptr);
   for (int sample = 1; sample <= 1000; ++sample) {
-    for (int i = 0; i < n; ++i) q[i] = low[i] + (high[i] - low[i]) * std::fmod(sample * std::pow(phi, -(i + 1.0)), 1.0);
+    q = configurations(sample);
     const double value = largest(q, nullptr);
     if (value > most) {
       most = value;

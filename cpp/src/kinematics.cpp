@@ -1,49 +1,16 @@
 #include <sigmaik/kinematics.hpp>
 
-#include <cmath>
+#include "walk.hpp"
 
 namespace sigmaik {
 namespace {
 
-// Columns of a frame, padded to four entries so that they fill vector registers.
-struct FrameColumns {
-  Eigen::Vector4d x{1.0, 0.0, 0.0, 0.0}, y{0.0, 1.0, 0.0, 0.0}, z{0.0, 0.0, 1.0, 0.0}, p{0.0, 0.0, 0.0, 0.0};
+using detail::FrameColumns;
 
-  // This frame, then that of `rotation` and `translation` in it.
-  void append(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& translation) noexcept {
-    p += along(translation);
-    const Eigen::Vector4d new_x = along(rotation.col(0)), new_y = along(rotation.col(1));
-    z = along(rotation.col(2));
-    x = new_x;
-    y = new_y;
-  }
-
- private:
-  template <typename Entries>
-  Eigen::Vector4d along(const Entries& v) const noexcept {
-    return v[0] * x + v[1] * y + v[2] * z;
-  }
-};
-
-// Walks from the base to the tip. `joint(i, frame)` sees every joint's frame, whose z is its axis.
+// To the tip.
 template <typename Visit>
-Pose walk(const Chain& chain, const JointRef& q, Visit joint) noexcept {
-  const JointConstants* constants = chain.constants().data();
-  const int n = chain.dof();
-  FrameColumns f;
-  for (int i = 0; i < n; ++i) {
-    const JointConstants& c = constants[i];
-    f.append(c.rotation, c.translation);
-    if (c.prismatic) {
-      f.p += q[i] * f.z;
-    } else {
-      const double cosine = std::cos(q[i]), sine = std::sin(q[i]);
-      const Eigen::Vector4d x = f.x;
-      f.x = cosine * x + sine * f.y;
-      f.y = cosine * f.y - sine * x;
-    }
-    joint(i, f);
-  }
+Pose walk_to_tip(const Chain& chain, const JointRef& q, Visit joint) noexcept {
+  FrameColumns f = detail::walk(chain, q, joint);
   f.append(chain.tool().linear(), chain.tool().translation());
   Pose tip;
   tip.matrix() << f.x, f.y, f.z, f.p;
@@ -57,7 +24,7 @@ bool update(const Chain& chain, const JointRef& q, ChainState& state) noexcept {
   if (q.size() != chain.dof() || !q.allFinite()) return false;
   state.jacobian.resize(6, chain.dof());
   double* const columns = state.jacobian.data();
-  state.tip = walk(chain, q, [columns](int i, const FrameColumns& f) {
+  state.tip = walk_to_tip(chain, q, [columns](int i, const FrameColumns& f) {
     for (int k = 0; k < 3; ++k) {
       columns[6 * i + k] = f.p[k];  // v follows when the tip is known
       columns[6 * i + 3 + k] = f.z[k];
@@ -77,7 +44,7 @@ bool update(const Chain& chain, const JointRef& q, ChainState& state) noexcept {
 }
 
 Pose pose(const Chain& chain, const JointRef& q) noexcept {
-  return walk(chain, q, [](int, const FrameColumns&) {});
+  return walk_to_tip(chain, q, [](int, const FrameColumns&) {});
 }
 
 void jacobian_gradient(const Jacobian& jacobian, JacobianGradient& gradient) noexcept {

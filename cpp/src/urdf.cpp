@@ -23,6 +23,7 @@
 
 #include <sigmaik/chain.hpp>
 
+#include "link_shapes.hpp"
 #include "message.hpp"
 
 namespace sigmaik {
@@ -227,6 +228,15 @@ class Tree {
       above.push_back(joint->second.parent);
     }
     std::reverse(joints.begin(), joints.end());
+    return joints;
+  }
+
+  // Joints that hang on a link.
+  std::vector<const TreeJoint*> joints_on(const std::string& link) const {
+    std::vector<const TreeJoint*> joints;
+    const auto children = children_.find(link);
+    if (children == children_.end()) return joints;
+    for (const std::string& child : children->second) joints.push_back(&carrier_.at(child));
     return joints;
   }
 
@@ -530,16 +540,94 @@ Chain read_chain(const std::string& xml, std::string base, std::string tip, cons
   return Chain(std::move(base), std::move(segments));
 }
 
-}  // namespace
+// ---- Shapes --------------------------------------------------------------------------------------------------------
 
-Chain Chain::from_urdf(const std::string& source, const std::string& base, const std::string& tip,
-                       const std::vector<double>& acceleration) {
+double positive(const std::string& owner, const XMLElement& element, const char* attribute) {
+  const double value = number(owner, element, attribute);
+  require(value > 0.0, owner, ": <", element.Name(), " ", attribute, "=\"", value, "\">: it must be above 0");
+  return value;
+}
+
+// The shapes of one link, which stands at `pose` in the frame of `segment`.
+void add_shapes(const XMLElement& link, const std::string& name, int segment, const Pose& pose,
+                std::vector<detail::LinkShape>& shapes) {
+  using Kind = detail::LinkShape::Kind;
+  const std::string owner = "link '" + name + "'";
+  const char* const tag = link.FirstChildElement("collision") != nullptr ? "collision" : "visual";
+  bool mesh = false;
+  for (auto* e = link.FirstChildElement(tag); e != nullptr; e = e->NextSiblingElement(tag)) {
+    const XMLElement* const geometry = only_child(owner, *e, "geometry");
+    const XMLElement* const g = geometry != nullptr ? geometry->FirstChildElement() : nullptr;
+    if (g == nullptr) fail(owner, ": a <", tag, "> without geometry in line ", e->GetLineNum());
+    detail::LinkShape shape{segment, Kind::Mesh, pose * origin(owner, *e)};
+    const std::string_view what = g->Name();
+    if (what == "box") {
+      shape.kind = Kind::Box;
+      shape.size = vector(owner, *g, "size");
+      require(shape.size.minCoeff() > 0.0, owner, ": <box size=\"", shape.size.transpose(), "\">: it must be above 0");
+    } else if (what == "cylinder") {
+      shape.kind = Kind::Cylinder;
+      shape.size << positive(owner, *g, "radius"), positive(owner, *g, "length"), 0.0;
+    } else if (what == "sphere") {
+      shape.kind = Kind::Sphere;
+      shape.size << positive(owner, *g, "radius"), 0.0, 0.0;
+    } else {
+      mesh = true;
+      continue;
+    }
+    shapes.push_back(shape);
+  }
+  if (mesh) shapes.push_back({segment, Kind::Mesh, pose});
+}
+
+std::vector<detail::LinkShape> shapes_of(const Chain& chain, const std::string& xml) {
+  tinyxml2::XMLDocument document;
+  const Tree tree(parse(xml, document));
+  tree.require_link("base", chain.base());
+  tree.require_link("tip", chain.tip());
+  std::vector<std::string> links{chain.base()};
+  for (const TreeJoint* joint : tree.path(chain.base(), chain.tip())) links.push_back(joint->child);
+  std::vector<std::string> expected{chain.base()};
+  for (const Segment& segment : chain.segments()) expected.push_back(segment.link_name);
+  if (links != expected) fail("not the arm's: its links are ", listed(links), ", the arm's ", listed(expected));
+
+  std::vector<detail::LinkShape> shapes;
+  for (std::size_t i = 0; i < links.size(); ++i) {
+    // The link, and what fixed joints carry beside the arm.
+    std::vector<std::pair<std::string, Pose>> rigid{{links[i], Pose::Identity()}};
+    for (std::size_t k = 0; k < rigid.size(); ++k) {
+      const auto [name, pose] = rigid[k];
+      add_shapes(tree.link(name), name, static_cast<int>(i) - 1, pose, shapes);
+      for (const TreeJoint* joint : tree.joints_on(name)) {
+        if (i + 1 < links.size() && joint->child == links[i + 1]) continue;
+        if (joint->element->Attribute("type", "fixed") == nullptr) continue;
+        rigid.emplace_back(joint->child, pose * origin(joint->label(), *joint->element));
+      }
+    }
+  }
+  return shapes;
+}
+
+// What `work` makes of a source's XML, whose errors say where they come from.
+template <typename Work>
+auto with_label(const std::string& source, Work work) {
   const Source text = read(source);
   try {
-    return read_chain(text.xml, base, tip, acceleration);
+    return work(text.xml);
   } catch (const Error& e) {
     throw Error(text.label + ": " + printable(e.what()));
   }
+}
+
+}  // namespace
+
+std::vector<detail::LinkShape> detail::read_shapes(const Chain& chain, const std::string& source) {
+  return with_label(source, [&chain](const std::string& xml) { return shapes_of(chain, xml); });
+}
+
+Chain Chain::from_urdf(const std::string& source, const std::string& base, const std::string& tip,
+                       const std::vector<double>& acceleration) {
+  return with_label(source, [&](const std::string& xml) { return read_chain(xml, base, tip, acceleration); });
 }
 
 }  // namespace sigmaik

@@ -127,15 +127,15 @@ class IndexCost : public JointCost {
     double ignored;
     return weight_ * shape(index_.value(state.jacobian), ignored);
   }
-  double slope(const JointRef& q, JointVector& gradient) const noexcept override {
+  double gradient(const JointRef& q, JointVector& slope) const noexcept override {
     double factor;
-    const double value = shape(index_.value(chain_, q, gradient), factor);
-    gradient *= weight_ * factor;
+    const double value = shape(index_.value(chain_, q, slope), factor);
+    slope *= weight_ * factor;
     return weight_ * value;
   }
   double model(const JointRef& q, JointVector& gradient, JointMatrix& hessian) const noexcept override {
-    difference_hessian(q, hessian, [this](const JointVector& x, JointVector& g) { slope(x, g); });
-    return slope(q, gradient);
+    difference_hessian(q, hessian, [this](const JointVector& x, JointVector& g) { this->gradient(x, g); });
+    return this->gradient(q, gradient);
   }
 
  protected:
@@ -190,12 +190,12 @@ class SumCost final : public JointCost {
     for (const JointCostPtr& cost : costs_) sum += cost->value(q);
     return sum;
   }
-  double slope(const JointRef& q, JointVector& gradient) const noexcept override {
+  double gradient(const JointRef& q, JointVector& slope) const noexcept override {
     JointVector g(dof());
-    double sum = costs_.front()->slope(q, gradient);
+    double sum = costs_.front()->gradient(q, slope);
     for (std::size_t i = 1; i < costs_.size(); ++i) {
-      sum += costs_[i]->slope(q, g);
-      gradient += g;
+      sum += costs_[i]->gradient(q, g);
+      slope += g;
     }
     return sum;
   }

@@ -93,7 +93,7 @@ struct SupportPlanner::Work {
     double sum = 0.0;
     for (int i = 0; i < m; ++i) {
       scratch = q.row(i).transpose();
-      sum += cost->slope(scratch, gradient);
+      sum += cost->gradient(scratch, gradient);
       out.row(i) = gradient.transpose();
     }
     return sum;

@@ -2,6 +2,7 @@
 /// \file joint_cost.hpp
 /// What a plan pays for where it is: a smooth function of joint positions, added up over a trajectory's nodes.
 
+#include <cstddef>
 #include <memory>
 
 #include <sigmaik/types.hpp>
@@ -19,17 +20,23 @@ class JointCost {
   /// Cost at q (n,), finite for finite q. Real time.
   virtual double value(const JointRef& q) const noexcept = 0;
 
-  /// Cost, with gradient (n,). Real time.
-  virtual double slope(const JointRef& q, JointVector& gradient) const noexcept {
-    JointMatrix hessian(dof(), dof());
-    return model(q, gradient, hessian);
-  }
-
   /// Cost, with gradient (n,) and Hessian (n, n), symmetric. Real time.
   virtual double model(const JointRef& q, JointVector& gradient, JointMatrix& hessian) const noexcept = 0;
+
+  /// Cost, with gradient (n,). Real time; by default what model() says.
+  virtual double gradient(const JointRef& q, JointVector& gradient) const noexcept;
 };
 
 /// Shared by the plans that use it; null costs nothing.
 using JointCostPtr = std::shared_ptr<const JointCost>;
+
+/// Values, and gradients where `gradient` is not null, at `count` configurations. The answers depend neither on their
+/// order nor on `threads`.
+/// \param q (count, n) in C order, finite
+/// \param value out: (count,)   \param gradient out: (count, n), or null
+/// \param threads ≥ 1, the most that work at once; never more than the machine has cores
+/// \throws Error where threads is below 1
+void evaluate(const JointCost& cost, std::size_t count, const double* q, double* value, double* gradient = nullptr,
+              int threads = 1);
 
 }  // namespace sigmaik::planning

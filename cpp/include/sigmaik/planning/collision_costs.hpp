@@ -1,0 +1,69 @@
+#pragma once
+/// \file collision_costs.hpp
+/// Costs that keep a plan off obstacles, off the arm itself, and off its joint limits.
+///
+/// All are sums of hinges of a distance d that is to be at least ε, the clearance (Zucker et al. 2013, eq. 21):
+///
+///     c(d) = 0   d ≥ ε,        (ε − d)²/(2ε)   0 ≤ d < ε,        ε/2 − d   d < 0
+///
+/// quadratic where there is contact to come, linear where there is contact, with one continuous slope. Their Hessians are
+/// positive semidefinite: Σ w(d) (∂d/∂q)ᵀ(∂d/∂q) with w = 1/max(ε, ε − d) within the clearance, the curvature of the
+/// parabola that touches the hinge from above. Where 0 ≤ d < ε it is c″, so that this is the Gauss-Newton Hessian.
+
+#include <array>
+#include <cstddef>
+#include <vector>
+
+#include <sigmaik/chain.hpp>
+#include <sigmaik/planning/arm_spheres.hpp>
+#include <sigmaik/planning/distance_field.hpp>
+#include <sigmaik/planning/joint_cost.hpp>
+
+namespace sigmaik::planning {
+
+/// weight · Σ_i c(d_i): d_i the signed distance from sphere i's surface to the obstacles, i all spheres that a joint moves.
+/// The field is in the axes of the arm's base.
+/// \param clearance ε [m] > 0
+/// \throws Error where a parameter is out of its range
+JointCostPtr collision_cost(const ArmSpheres& spheres, const DistanceField& field, double clearance = 0.05,
+                            double weight = 1.0);
+
+/// Two spheres of an arm, by index.
+using SpherePair = std::array<int, 2>;
+
+/// Pairs of spheres that may come into contact: those of links that are not neighbours, i.e. with two or more joints
+/// between them, the base's included. Left out are those in contact at more than `most_contacts` of 1000 quasi-random
+/// configurations within the joint limits (±π where there are none): shapes that overlap by their make. The same on every
+/// machine; takes some ms.
+/// \param most_contacts 0 … 1
+/// \throws Error where it is out of its range
+std::vector<SpherePair> self_collision_pairs(const ArmSpheres& spheres, double most_contacts = 0.1);
+
+/// weight · Σ c(d) over pairs of spheres, d the distance of their surfaces.
+/// \param clearance ε [m] > 0
+/// \throws Error where a parameter is out of its range, or a pair is not of two spheres of this arm
+JointCostPtr self_collision_cost(const ArmSpheres& spheres, const std::vector<SpherePair>& pairs,
+                                 double clearance = 0.02, double weight = 1.0);
+
+/// weight · Σ_j ½ x_j², x_j the way by which joint j is nearer to a limit than `margin` [rad or m], or beyond it. Joints
+/// without limits cost nothing.
+/// \param margin ≥ 0
+/// \throws Error where a parameter is out of its range
+JointCostPtr joint_limit_cost(const Chain& chain, double margin = 0.1, double weight = 1.0);
+
+/// The sum of some costs of the same number of joints.
+/// \throws Error where there is none, one is null, or they differ in their number of joints
+JointCostPtr sum_of(const std::vector<JointCostPtr>& costs);
+
+/// The least signed distance [m] from a sphere that a joint moves to the obstacles: below 0 there is contact. Real time;
+/// q must have chain().dof() finite entries.
+double min_distance(const ArmSpheres& spheres, const DistanceField& field, const JointRef& q) noexcept;
+
+/// The same at `count` configurations.
+/// \param q (count, n) in C order, finite   \param distance out: (count,)
+/// \param threads ≥ 1, the most that work at once
+/// \throws Error where threads is below 1
+void min_distance(const ArmSpheres& spheres, const DistanceField& field, std::size_t count, const double* q,
+                  double* distance, int threads = 1);
+
+}  // namespace sigmaik::planning

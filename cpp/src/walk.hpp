@@ -1,0 +1,57 @@
+#pragma once
+// From a chain's base to its tip, in one flat pass over its constants.
+
+#include <cmath>
+
+#include <sigmaik/chain.hpp>
+#include <sigmaik/types.hpp>
+
+namespace sigmaik::detail {
+
+// Columns of a frame, padded to four entries so that they fill vector registers.
+struct FrameColumns {
+  Eigen::Vector4d x{1.0, 0.0, 0.0, 0.0}, y{0.0, 1.0, 0.0, 0.0}, z{0.0, 0.0, 1.0, 0.0}, p{0.0, 0.0, 0.0, 0.0};
+
+  // This frame, then that of `rotation` and `translation` in it.
+  void append(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& translation) noexcept {
+    p += along(translation);
+    const Eigen::Vector4d new_x = along(rotation.col(0)), new_y = along(rotation.col(1));
+    z = along(rotation.col(2));
+    x = new_x;
+    y = new_y;
+  }
+
+  // Where a point of this frame is.
+  Eigen::Vector4d at(const Eigen::Vector3d& point) const noexcept { return p + along(point); }
+
+ private:
+  template <typename Entries>
+  Eigen::Vector4d along(const Entries& v) const noexcept {
+    return v[0] * x + v[1] * y + v[2] * z;
+  }
+};
+
+// Walks from the base to the last joint, whose frame is returned. `joint(i, frame)` sees every joint's frame, whose z is
+// its axis.
+template <typename Visit>
+FrameColumns walk(const Chain& chain, const JointRef& q, Visit joint) noexcept {
+  const JointConstants* constants = chain.constants().data();
+  const int n = chain.dof();
+  FrameColumns f;
+  for (int i = 0; i < n; ++i) {
+    const JointConstants& c = constants[i];
+    f.append(c.rotation, c.translation);
+    if (c.prismatic) {
+      f.p += q[i] * f.z;
+    } else {
+      const double cosine = std::cos(q[i]), sine = std::sin(q[i]);
+      const Eigen::Vector4d x = f.x;
+      f.x = cosine * x + sine * f.y;
+      f.y = cosine * f.y - sine * x;
+    }
+    joint(i, f);
+  }
+  return f;
+}
+
+}  // namespace sigmaik::detail
