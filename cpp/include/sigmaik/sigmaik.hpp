@@ -25,6 +25,7 @@
 ///     constrained_ik.hpp   ConstrainedIk: a pose exactly in part, the rest as limits allow; time scaling (not included)
 ///     planning/time_optimal.hpp  TimeOptimal: motions within limits, away from what a cost marks (not included)
 ///     planning/costs.hpp         costs for it: potentials, manipulability (not included)
+///     planning/cart.hpp          cart_law: where to drive the cart of a cart-mounted arm, clear of a cylinder (not included)
 ///
 /// Set-up throws Error. Calls marked "real time" are noexcept, bounded, and touch neither heap nor lock.
 

@@ -3,10 +3,24 @@
     trajectory = sk.planning.time_optimal(chain, start, goal, avoid="potential", time_weight=600.0)
     trajectory.t, trajectory.q, trajectory.qdot, trajectory.qddot
     trajectory.clearance.min_manipulability, trajectory.clearance.crossings
+
+    motion = sk.planning.cart_motion(flange_xy, start, end, radius)   # of the cart under an arm
+    motion.x, motion.energy, motion.clearance
 """
 
+from .cart import CartError, CartMotion, CartRegion, cart_motion, evaluate_cart_motion
 from .clearance import Clearance, Crossing
 from .time_optimal import time_optimal
 from .trajectory import Trajectory
 
-__all__ = ["Clearance", "Crossing", "Trajectory", "time_optimal"]
+__all__ = [
+    "CartError",
+    "CartMotion",
+    "CartRegion",
+    "Clearance",
+    "Crossing",
+    "Trajectory",
+    "cart_motion",
+    "evaluate_cart_motion",
+    "time_optimal",
+]
