@@ -9,6 +9,7 @@
 """
 
 from .cart import CartError, CartMotion, CartRegion, cart_motion, evaluate_cart_motion
+from .cart_trajectory import CartTrajectory, ShoulderCylinder, cart_trajectory, shoulder_cylinder
 from .clearance import Clearance, Crossing
 from .time_optimal import time_optimal
 from .trajectory import Trajectory
@@ -17,10 +18,14 @@ __all__ = [
     "CartError",
     "CartMotion",
     "CartRegion",
+    "CartTrajectory",
     "Clearance",
     "Crossing",
+    "ShoulderCylinder",
     "Trajectory",
     "cart_motion",
+    "cart_trajectory",
     "evaluate_cart_motion",
+    "shoulder_cylinder",
     "time_optimal",
 ]
