@@ -549,6 +549,7 @@ int cart_descent(const VectorRef& lower, const VectorRef& upper, VectorXd& x, co
   require(std::isfinite(o.alpha) && o.alpha > 0.0, "alpha = ", o.alpha, " must be finite and greater than 0");
   require(std::isfinite(o.step) && o.step > 0.0, "step = ", o.step, " must be finite and greater than 0");
   require(o.max_iterations >= 1, "max_iterations = ", o.max_iterations, " must be at least 1");
+  require(std::isfinite(o.depth) && o.depth >= 0.0, "depth = ", o.depth, " mm must be finite and not negative");
   constexpr double kMillimetres = 1e3;
   // Centre, half width and slope of H; a half width of −1 where nothing is forbidden.
   VectorXd centre(m), half(m), kick(m);
@@ -562,19 +563,22 @@ int cart_descent(const VectorRef& lower, const VectorRef& upper, VectorXd& x, co
   VectorXd now = kMillimetres * x, next = now;
   int done = 0;
   while (done < o.max_iterations) {
-    int inside = 0;
+    double deepest = 0.0;
     for (Eigen::Index i = 1; i + 1 < m; ++i) {
-      const double d = now[i] - centre[i];
-      const bool in = std::abs(d) < half[i];
-      const double push = !in || d == 0.0 ? 0.0 : d > 0.0 ? kick[i] : -kick[i];
-      inside += in;
+      const double d = now[i] - centre[i], depth = half[i] - std::abs(d);
+      const double push = depth <= 0.0 || d == 0.0 ? 0.0 : d > 0.0 ? kick[i] : -kick[i];
+      deepest = std::max(deepest, depth);
       next[i] = now[i] + push - smooth * (2.0 * now[i] - now[i - 1] - now[i + 1]);
     }
-    if (o.until_admissible && inside == 0) break;
+    if (o.until_admissible && deepest <= o.depth) break;
     now.swap(next);
     ++done;
   }
-  x = now / kMillimetres;
+  const auto put = [&](Eigen::Index i) {
+    return now[i] > centre[i] ? std::max(now[i] / kMillimetres, upper[i]) : std::min(now[i] / kMillimetres, lower[i]);
+  };
+  const bool shallow = ((half - (now - centre).cwiseAbs()).segment(1, m - 2).array() <= o.depth).all();
+  for (Eigen::Index i = 1; i + 1 < m; ++i) x[i] = shallow && half[i] > 0.0 ? put(i) : now[i] / kMillimetres;
   return done;
 }
 

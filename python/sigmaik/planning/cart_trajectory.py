@@ -211,8 +211,8 @@ def cart_trajectory(
     # The point, in the frame of the tool, and seen from the first axis at cart position 0.
     in_tool = np.linalg.solve(hand, np.append(spot, 1.0))
     azimuth = [_azimuth((base @ chain.pose(c[1:]))[:3] @ np.append(spot, 1.0) - axis) for c in configurations]
-    to_tip = np.linalg.inv(hand)
-    to_base = np.linalg.inv(base)
+    to_tip: Array = np.asarray(np.linalg.inv(hand), dtype=np.float64)
+    to_base: Array = np.asarray(np.linalg.inv(base), dtype=np.float64)
 
     times, rows, tools, motions, taught_at = [np.zeros(1)], [configurations[:1]], [targets[:1]], [], [0]
     worst = 0.0
@@ -348,7 +348,8 @@ def _azimuth(v: Array) -> float:
 
 
 def _least(chain: Chain, q: Array) -> Array:
-    return np.linalg.svd(chain.jacobian(q), compute_uv=False)[:, -1]
+    least: Array = np.asarray(np.linalg.svd(chain.jacobian(q), compute_uv=False)[:, -1], dtype=np.float64)
+    return least
 
 
 def _rates(t: Array, q: Array, taught_at: list[int]) -> Array:
@@ -356,7 +357,8 @@ def _rates(t: Array, q: Array, taught_at: list[int]) -> Array:
     out = np.empty_like(q)
     for first, last in zip(taught_at[:-1], taught_at[1:], strict=True):
         part = slice(first, last + 1)
-        out[part] = np.gradient(q[part], t[part], axis=0, edge_order=min(2, last - first))
+        for j in range(q.shape[1]):
+            out[part, j] = np.gradient(q[part, j], t[part], edge_order=2 if last - first > 1 else 1)
     return out
 
 

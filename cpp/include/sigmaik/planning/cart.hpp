@@ -70,7 +70,7 @@ struct CartOptions {
   double margin = 0.0;  ///< [m] ≥ 0, added to the radius
   /// [rad] by which the azimuth of P seen from the axis turns between the ends, positive about z. Ways that turn by it
   /// to half a turn are taken; none: all are.
-  std::optional<double> turn;
+  std::optional<double> turn = std::nullopt;
   double duration = 1.0;  ///< [s] between the first and the last sample
   double max_speed = std::numeric_limits<double>::infinity();         ///< [m/s] > 0
   double max_acceleration = std::numeric_limits<double>::infinity();  ///< [m/s²] > 0, between the ends; see cart_law
@@ -126,7 +126,10 @@ struct CartDescent {
   double alpha = 0.01;         ///< [1/mm²] > 0, weight of smoothness in (10), between samples
   double step = 20.0;          ///< [mm²] > 0, η; stable below 1/(4 alpha)
   int max_iterations = 53707;  ///< ≥ 1
-  bool until_admissible = true;  ///< stop at the first law with ΣH = 0
+  bool until_admissible = true;  ///< stop at the first law that is admissible, to `depth`
+  /// [mm] ≥ 0. Kicks out of the region and creep into it keep a law at the border hopping: where no sample is deeper
+  /// inside than this, those inside are put on the border at the end.
+  double depth = 1e-3;
 };
 
 /// Gradient descent on the paper's functional F = ΣH(x_i) + α Σ(x_{i+1} − x_i)² (10), H = max(0, 1 − |x − x_P|/h) with h
