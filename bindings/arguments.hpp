@@ -134,6 +134,7 @@ void bind_analytic_ik(py::module_& m);
 void bind_indices(py::module_& m);
 void bind_singularities(py::module_& m);
 void bind_planning(py::module_& m);
+void bind_cart(py::module_& m);
 
 }  // namespace sigmaik::bindings
 

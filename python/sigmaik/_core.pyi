@@ -7,7 +7,7 @@ import enum
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['AdaptiveDampedLeastSquares', 'AnalyticBranch', 'AnalyticIk', 'Chain', 'ConstrainedIk', 'ConstrainedIkStep', 'DEFAULT_SCALE', 'DampedLeastSquares', 'Dynamics', 'Error', 'JParse', 'JacobianProjection', 'JacobianSafety', 'JacobianSafetyProjection', 'JointCost', 'JointLimits', 'LeastSquaresSolution', 'PseudoInverse', 'SelectivelyDampedLeastSquares', 'Servo', 'ServoStep', 'SingularSets', 'Solution', 'Spectrum', 'Status', 'SupportPlanner', 'SupportStates', 'TimeOptimal', 'TimeOptimalResult', 'VelocitySolver', 'evaluate_index', 'geometry_aware_cost', 'index_of_jacobian', 'known_singular_sets', 'least_squares', 'load_singular_sets', 'log_manipulability_cost', 'manipulability_cost', 'pose_error', 'potential_cost', 'reference_scale', 'rotation_exp', 'rotation_log', 'singular_sets_of', 'solve_batch', 'spline_velocities', 'sum_of_costs']
+__all__: list[str] = ['AdaptiveDampedLeastSquares', 'AnalyticBranch', 'AnalyticIk', 'CartError', 'CartLaw', 'CartRegion', 'Chain', 'ConstrainedIk', 'ConstrainedIkStep', 'DEFAULT_SCALE', 'DampedLeastSquares', 'Dynamics', 'Error', 'JParse', 'JacobianProjection', 'JacobianSafety', 'JacobianSafetyProjection', 'JointCost', 'JointLimits', 'LeastSquaresSolution', 'PseudoInverse', 'SelectivelyDampedLeastSquares', 'Servo', 'ServoStep', 'SingularSets', 'Solution', 'Spectrum', 'Status', 'SupportPlanner', 'SupportStates', 'TimeOptimal', 'TimeOptimalResult', 'VelocitySolver', 'cart_descent', 'cart_law', 'evaluate_index', 'forbidden_intervals', 'geometry_aware_cost', 'index_of_jacobian', 'known_singular_sets', 'least_squares', 'load_singular_sets', 'log_manipulability_cost', 'manipulability_cost', 'pose_error', 'potential_cost', 'reference_scale', 'rotation_exp', 'rotation_log', 'singular_sets_of', 'solve_batch', 'spline_velocities', 'sum_of_costs', 'taut_string']
 class Error(ValueError):
     """
     What set-up and checked calls refuse. The text carries the facts.
@@ -988,9 +988,100 @@ class TimeOptimal:
 
         Raises Error where an end is outside its limits. One call at a time for each object.
         """
+class CartError(Error):
+    """
+    No cart motion keeps out of the forbidden region. The text carries the facts.
+    """
+    feasible_radius: typing.ClassVar[float]
+    reason: typing.ClassVar[str] = ''
+class CartRegion:
+    """
+    A connected part of the forbidden region, in the plane of time and cart position.
+    """
+    @property
+    def first(self) -> float:
+        """
+        [samples] where it begins: its tip, between samples.
+        """
+    @property
+    def last(self) -> float:
+        """
+        [samples] where it ends.
+        """
+    @property
+    def side(self) -> int:
+        """
+        1: the law passes above λ+; −1: below λ−.
+        """
+class CartLaw:
+    """
+    Answer of cart_law().
+    """
+    @property
+    def corner_x(self) -> list[float]:
+        """
+        [m] there.
+        """
+    @property
+    def corners(self) -> list[float]:
+        """
+        [samples] where the string bends, and its ends.
+        """
+    @property
+    def energy(self) -> float:
+        """
+        [m²] Σ (Δx)².
+        """
+    @property
+    def lower(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (M,) [m] λ−, ∞ where nothing is forbidden.
+        """
+    @property
+    def multipliers(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (M,) [m] μ.
+        """
+    @property
+    def regions(self) -> list[CartRegion]:
+        """
+        Connected parts of the forbidden region.
+        """
+    @property
+    def strings(self) -> int:
+        """
+        Taut strings drawn.
+        """
+    @property
+    def turn(self) -> float:
+        """
+        [rad] of the point's azimuth.
+        """
+    @property
+    def upper(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (M,) [m] λ+, −∞ where nothing is forbidden.
+        """
+    @property
+    def x(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (M,) [m]
+        """
+def cart_descent(lower: numpy.typing.ArrayLike, upper: numpy.typing.ArrayLike, guess: numpy.typing.ArrayLike, alpha: typing.SupportsFloat | typing.SupportsIndex, step: typing.SupportsFloat | typing.SupportsIndex, max_iterations: typing.SupportsInt | typing.SupportsIndex, until_admissible: bool) -> tuple[numpy.typing.NDArray[numpy.float64], int]:
+    """
+    Gradient descent (10) from a guess (M,) [m]: the law and the number of iterations.
+    """
+def cart_law(flange_xy: numpy.typing.ArrayLike, start: typing.SupportsFloat | typing.SupportsIndex, end: typing.SupportsFloat | typing.SupportsIndex, radius: typing.SupportsFloat | typing.SupportsIndex, *, lower: typing.SupportsFloat | typing.SupportsIndex, upper: typing.SupportsFloat | typing.SupportsIndex, margin: typing.SupportsFloat | typing.SupportsIndex, turn: typing.SupportsFloat | typing.SupportsIndex | None, duration: typing.SupportsFloat | typing.SupportsIndex, max_speed: typing.SupportsFloat | typing.SupportsIndex, max_acceleration: typing.SupportsFloat | typing.SupportsIndex) -> CartLaw:
+    """
+    The cart's law of the least energy. `sigmaik.planning.cart_motion` is what to call.
+    """
 def evaluate_index(chain: Chain, q: numpy.typing.ArrayLike, index: str, k: numpy.typing.ArrayLike = 6.0, length_scale: typing.SupportsFloat | typing.SupportsIndex = 1.0, threads: typing.SupportsInt | typing.SupportsIndex = 1) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
     """
     Values () or (B,) and gradients (n,) or (B, n) at q (n,) or (B, n).
+    """
+def forbidden_intervals(flange_xy: numpy.typing.ArrayLike, radius: typing.SupportsFloat | typing.SupportsIndex) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
+    """
+    λ−, λ+ (M,) [m]; ∞ and −∞ where nothing is forbidden.
     """
 def geometry_aware_cost(chain: Chain, k: typing.SupportsFloat | typing.SupportsIndex, weight: typing.SupportsFloat | typing.SupportsIndex) -> JointCost:
     """
@@ -1067,6 +1158,10 @@ def spline_velocities(q: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.f
 def sum_of_costs(costs: collections.abc.Sequence[JointCost]) -> JointCost:
     """
     Σ of costs for the same joints.
+    """
+def taut_string(at: numpy.typing.ArrayLike, lower: numpy.typing.ArrayLike, upper: numpy.typing.ArrayLike) -> tuple[numpy.typing.NDArray[numpy.float64], list[int]]:
+    """
+    The shortest string x (N,) through lower ≤ x ≤ upper over increasing `at`, and the indices of its corners.
     """
 DEFAULT_SCALE: float = 6.0
 __version__: str

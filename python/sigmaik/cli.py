@@ -1,4 +1,4 @@
-"""The command `sigmaik`: reach, limits, axis5, montecarlo and reaching (experiments), robots, info.
+"""The command `sigmaik`: reach, limits, axis5, montecarlo, reaching and cart (experiments), robots, info.
 
 Everything that is asked of a file or an option and is wrong there ends with one line on stderr and exit code
 2.
@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 import sigmaik as sk
 
 from . import experiments as ex
+from .cli_cart import add_cart
 from .cli_montecarlo import add_montecarlo
 from .cli_reaching import add_reaching
 from .console import MissingPackage, need, terminal
@@ -67,6 +68,7 @@ def _parser() -> argparse.ArgumentParser:
         commands.add_parser("montecarlo", help="random motions, clear of singularities or not: what it costs and brings")
     )
     add_reaching(commands.add_parser("reaching", help="motions along a good geometry-aware index, and others"))
+    add_cart(commands.add_parser("cart", help="an arm on a cart by its shoulder singularity: four ways to drive the cart"))
     robots = commands.add_parser("robots", help="list the arms that are shipped, and their paths")
     robots.set_defaults(run=_robots)
     _add_info(commands.add_parser("info", help="an arm's joints, limits, reach and singular values"))

@@ -26,6 +26,7 @@
 ///     planning/time_optimal.hpp  TimeOptimal: motions within limits, away from what a cost marks (not included)
 ///     planning/support_states.hpp  SupportPlanner: smooth motions along which a cost is low, by gradient or samples
 ///     planning/costs.hpp         costs for both: potentials, manipulability, geometry-aware index (not included)
+///     planning/cart.hpp          cart_law: where to drive the cart of a cart-mounted arm, clear of a cylinder (not included)
 ///
 /// Set-up throws Error. Calls marked "real time" are noexcept, bounded, and touch neither heap nor lock.
 

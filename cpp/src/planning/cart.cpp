@@ -1,0 +1,585 @@
+#include <sigmaik/planning/cart.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <queue>
+#include <string>
+
+#include "../message.hpp"
+
+namespace sigmaik::planning {
+namespace {
+
+using sigmaik::detail::message;
+using sigmaik::detail::require;
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr double kPi = 3.14159265358979323846;
+constexpr double kNear = 1e-6;  // [samples] a tip keeps away from the samples beside it
+constexpr int kLeap = 16;       // points inside a region that lies between two samples
+
+// The samples, and between them what the region has there: its tips, and all of it where a step leaps over it.
+struct Grid {
+  std::vector<double> at;             // [samples]
+  std::vector<double> px, py;         // P [m]
+  std::vector<double> lower, upper;   // λ∓ [m]
+  std::vector<int> region;            // index, or −1
+  std::vector<int> sample;            // of the samples, where they are in here
+  int regions = 0;
+
+  int size() const { return static_cast<int>(at.size()); }
+};
+
+Grid make_grid(const PlanarPath& path, double r) {
+  const int m = static_cast<int>(path.rows());
+  Grid g;
+  for (auto* v : {&g.at, &g.px, &g.py, &g.lower, &g.upper}) v->reserve(static_cast<std::size_t>(m) + kLeap);
+  g.region.reserve(static_cast<std::size_t>(m) + kLeap);
+  g.sample.reserve(static_cast<std::size_t>(m));
+  const auto add = [&](double at, double px, double py, double h) {
+    g.at.push_back(at);
+    g.px.push_back(px);
+    g.py.push_back(py);
+    g.lower.push_back(h >= 0.0 ? px - h : kInfinity);
+    g.upper.push_back(h >= 0.0 ? px + h : -kInfinity);
+    g.region.push_back(h >= 0.0 ? g.regions : -1);
+  };
+  // The point of the step from sample i where y has this value.
+  const auto add_between = [&](int i, double y, double h) {
+    const double f = std::clamp((y - path(i, 1)) / (path(i + 1, 1) - path(i, 1)), kNear, 1.0 - kNear);
+    add(i + f, path(i, 0) + f * (path(i + 1, 0) - path(i, 0)), path(i, 1) + f * (path(i + 1, 1) - path(i, 1)), h);
+  };
+  for (int i = 0; i < m; ++i) {
+    const double x = path(i, 0), y = path(i, 1);
+    const bool in = std::abs(y) < r;
+    g.sample.push_back(g.size());
+    add(i, x, y, in ? std::sqrt((r - y) * (r + y)) : -1.0);
+    if (i + 1 == m) {
+      if (in) ++g.regions;
+      break;
+    }
+    const double next = path(i + 1, 1);
+    const bool next_in = std::abs(next) < r;
+    if (in && !next_in) {
+      add_between(i, std::copysign(r, next), 0.0);
+      ++g.regions;
+    } else if (!in && next_in) {
+      add_between(i, std::copysign(r, y), 0.0);
+    } else if (!in && !next_in && (y > 0.0) != (next > 0.0)) {
+      for (int k = 0; k <= kLeap; ++k) {
+        const double angle = kPi * (static_cast<double>(k) / kLeap - 0.5), sign = y > 0.0 ? -1.0 : 1.0;
+        add_between(i, sign * r * std::sin(angle), k % kLeap == 0 ? 0.0 : r * std::cos(angle));
+      }
+      ++g.regions;
+    }
+  }
+  return g;
+}
+
+struct Point {
+  double t, x;
+  int index;
+};
+
+// b is below the line from a to c; mirrored for kSign −1.
+template <int kSign>
+bool below(const Point& a, const Point& b, const Point& c) {
+  return kSign * ((c.x - b.x) * (b.t - a.t) - (b.x - a.x) * (c.t - b.t)) > 0.0;
+}
+
+// A taut string in a tube, after the funnels of Lee and Preparata (1984). From the last corner on, the chain `low` is
+// the least concave function above the lower bounds, `high` the greatest convex one below the upper bounds. A bound
+// that the other chain stands in the way of pulls the string around that chain.
+class Funnel {
+ public:
+  void draw(int n, const double* at, const double* lower, const double* upper, double* x, std::vector<int>& corners) {
+    for (Chain* chain : {&low_, &high_}) chain->points.reserve(static_cast<std::size_t>(n));
+    corners.reserve(static_cast<std::size_t>(n));
+    value_.reserve(static_cast<std::size_t>(n));
+    corners.assign(1, 0);
+    value_.assign(1, lower[0]);
+    low_.begin({at[0], lower[0], 0});
+    high_.begin({at[0], lower[0], 0});
+    for (int i = 1; i < n; ++i) {
+      if (lower[i] > -kInfinity) add<1>({at[i], lower[i], i}, low_, high_, corners);
+      if (upper[i] < kInfinity) add<-1>({at[i], upper[i], i}, high_, low_, corners);
+    }
+    corners.push_back(n - 1);
+    value_.push_back(lower[n - 1]);
+    for (std::size_t k = 0; k + 1 < corners.size(); ++k) {
+      const int a = corners[k], b = corners[k + 1];
+      const double slope = (value_[k + 1] - value_[k]) / (at[b] - at[a]);
+      x[a] = value_[k];
+      // Between corners the string is in the tube but for rounding.
+      for (int i = a + 1; i < b; ++i) x[i] = std::clamp(value_[k] + slope * (at[i] - at[a]), lower[i], upper[i]);
+    }
+    x[n - 1] = lower[n - 1];
+  }
+
+ private:
+  struct Chain {
+    std::vector<Point> points;
+    std::size_t head = 0;
+
+    void begin(const Point& p) {
+      points.assign(1, p);
+      head = 0;
+    }
+    std::size_t size() const { return points.size() - head; }
+  };
+
+  // kSign 1: p is a lower bound, `own` the concave chain, `other` the convex one; −1: mirrored.
+  template <int kSign>
+  void add(const Point& p, Chain& own, Chain& other, std::vector<int>& corners) {
+    while (own.size() > 1 && !below<-kSign>(own.points[own.points.size() - 2], own.points.back(), p)) {
+      own.points.pop_back();
+    }
+    while (own.size() == 1 && other.size() > 1 && below<kSign>(other.points[other.head], other.points[other.head + 1], p)) {
+      const Point& corner = other.points[++other.head];
+      own.begin(corner);
+      corners.push_back(corner.index);
+      value_.push_back(corner.x);
+    }
+    own.points.push_back(p);
+  }
+
+  Chain low_, high_;
+  std::vector<double> value_;  // of the string at its corners
+};
+
+struct Outcome {
+  std::optional<CartFault> fault;
+  std::string facts;
+  CartLaw law;
+};
+
+// The best sides by branch and bound: a node has some regions' sides fixed and leaves out the others.
+class Search {
+ public:
+  Search(const PlanarPath& path, double start, double end, double r, const CartOptions& options)
+      : grid_(make_grid(path, r)), start_(start), end_(end), r_(r), options_(options),
+        top_slope_(options.max_speed * options.duration / static_cast<double>(path.rows() - 1)) {}
+
+  Outcome run() {
+    Outcome out;
+    std::vector<signed char> sides;
+    if (!fix_sides(sides, out)) return out;
+    std::priority_queue<Node> open;
+    push(open, std::move(sides));
+    while (!open.empty()) {
+      const Node node = open.top();
+      open.pop();
+      if (node.branch < 0) {
+        if (node.sides != drawn_) draw(node.sides);
+        finish(out.law);
+        return out;
+      }
+      if (strings_ + 2 > options_.max_strings) {
+        out.fault = CartFault::Undecided;
+        out.facts = message("the forbidden region has ", grid_.regions, " parts, and after ", strings_,
+                            " strings it is still open on which sides of them to pass");
+        return out;
+      }
+      for (const signed char side : {1, -1}) {
+        if (!room(node.branch, side)) continue;
+        std::vector<signed char> child = node.sides;
+        child[static_cast<std::size_t>(node.branch)] = side;
+        push(open, std::move(child));
+      }
+    }
+    out.fault = CartFault::Winding;  // or speed: the caller tells them apart
+    return out;
+  }
+
+ private:
+  struct Node {
+    double energy;
+    int branch;  // the region to choose a side of; −1: the string is a law
+    std::vector<signed char> sides;
+    bool operator<(const Node& other) const { return energy > other.energy; }  // the least first
+  };
+  struct Extent {
+    int first, last;   // in the grid
+    double low, high;  // least λ−, largest λ+ [m]
+    bool crossing;     // y changes its sign
+  };
+
+  bool room(int region, int side) const {
+    const Extent& e = extents_[static_cast<std::size_t>(region)];
+    return side > 0 ? e.high <= options_.upper : e.low >= options_.lower;
+  }
+
+  // Sides that the ends decide. False, with the fault, where they cannot be.
+  bool fix_sides(std::vector<signed char>& sides, Outcome& out) {
+    const int n = grid_.size();
+    extents_.assign(static_cast<std::size_t>(grid_.regions), {n, -1, kInfinity, -kInfinity, false});
+    std::vector<double> first_y(static_cast<std::size_t>(grid_.regions));
+    for (int i = 0; i < n; ++i) {
+      const auto k = static_cast<std::size_t>(i);
+      if (grid_.region[k] < 0) continue;
+      const auto j = static_cast<std::size_t>(grid_.region[k]);
+      Extent& e = extents_[j];
+      if (e.last < 0) {
+        e.first = i;
+        first_y[j] = grid_.py[k];
+      }
+      e.last = i;
+      e.low = std::min(e.low, grid_.lower[k]);
+      e.high = std::max(e.high, grid_.upper[k]);
+      e.crossing = e.crossing || (grid_.py[k] > 0.0) != (first_y[j] > 0.0);
+    }
+    const double start_distance = std::hypot(grid_.px.front() - start_, grid_.py.front());
+    const double end_distance = std::hypot(grid_.px.back() - end_, grid_.py.back());
+    const auto inside = [&](CartFault fault, const char* which, double distance) {
+      out.fault = fault;
+      out.facts = message("the ", which, " is in the forbidden region: the point is ", distance,
+                          " m from the first joint's axis, which has to be more than ", r_, " m");
+    };
+    if (start_distance <= r_) return inside(CartFault::StartInside, "start", start_distance), false;
+    if (end_distance <= r_) return inside(CartFault::EndInside, "end", end_distance), false;
+
+    sides.assign(static_cast<std::size_t>(grid_.regions), 0);
+    for (int j = 0; j < grid_.regions; ++j) {
+      const Extent& e = extents_[static_cast<std::size_t>(j)];
+      const int at_start = e.first > 0 ? 0 : start_ > grid_.px.front() ? 1 : -1;
+      const int at_end = e.last + 1 < n ? 0 : end_ > grid_.px.back() ? 1 : -1;
+      if (at_start * at_end < 0) {
+        out.fault = CartFault::OppositeSides;
+        out.facts = message("the cart starts ", at_start > 0 ? "above" : "below", " the forbidden region and ends ",
+                            at_end > 0 ? "above" : "below", " it, but the region has no gap from the first to the last sample");
+        return false;
+      }
+      const int side = at_start != 0 ? at_start : at_end;
+      if (side != 0 ? !room(j, side) : !room(j, 1) && !room(j, -1)) {
+        out.fault = CartFault::Range;
+        out.facts = message("between samples ", grid_.at[static_cast<std::size_t>(e.first)], " and ",
+                            grid_.at[static_cast<std::size_t>(e.last)], " the cart would have to be ");
+        if (side >= 0) out.facts += message("at ", e.high, " m");
+        if (side == 0) out.facts += " or ";
+        if (side <= 0) out.facts += message("at ", e.low, " m");
+        out.facts += message(", out of its range [", options_.lower, ", ", options_.upper, "] m");
+        return false;
+      }
+      sides[static_cast<std::size_t>(j)] = static_cast<signed char>(side);
+    }
+    return true;
+  }
+
+  // The taut string for these sides into x_, corners_.
+  void draw(const std::vector<signed char>& sides) {
+    const auto n = static_cast<std::size_t>(grid_.size());
+    low_.assign(n, options_.lower);
+    high_.assign(n, options_.upper);
+    x_.resize(n);
+    for (std::size_t j = 0; j < sides.size(); ++j) {
+      const auto first = static_cast<std::size_t>(extents_[j].first), last = static_cast<std::size_t>(extents_[j].last);
+      if (sides[j] > 0) {
+        for (std::size_t k = first; k <= last; ++k) low_[k] = std::max(low_[k], grid_.upper[k]);
+      } else if (sides[j] < 0) {
+        for (std::size_t k = first; k <= last; ++k) high_[k] = std::min(high_[k], grid_.lower[k]);
+      }
+    }
+    low_.front() = high_.front() = start_;
+    low_.back() = high_.back() = end_;
+    funnel_.draw(static_cast<int>(n), grid_.at.data(), low_.data(), high_.data(), x_.data(), corners_);
+    drawn_ = sides;
+    ++strings_;
+  }
+
+  // Draws the string, and keeps it where it can lead to a law.
+  void push(std::priority_queue<Node>& open, std::vector<signed char> sides) {
+    draw(sides);
+    Node node{0.0, -1, {}};
+    for (std::size_t k = 0; k + 1 < corners_.size(); ++k) {
+      const auto a = static_cast<std::size_t>(corners_[k]), b = static_cast<std::size_t>(corners_[k + 1]);
+      const double length = grid_.at[b] - grid_.at[a], rise = x_[b] - x_[a];
+      if (std::abs(rise) > top_slope_ * length * (1.0 + 1e-12)) return;
+      node.energy += rise * rise / length;
+    }
+    // The region that the string is deepest in.
+    double deepest = 0.0;
+    for (std::size_t j = 0; j < sides.size(); ++j) {
+      if (sides[j] != 0) continue;
+      const double depth = depth_in(extents_[j]);
+      if (depth > deepest) {
+        deepest = depth;
+        node.branch = static_cast<int>(j);
+      }
+    }
+    // Not in any: a law, if it turns the joint as asked. If not, on another side of a region where that makes a turn.
+    if (node.branch < 0 && options_.turn && std::abs(turn() - *options_.turn) > kPi) {
+      for (std::size_t j = 0; j < sides.size() && node.branch < 0; ++j) {
+        if (sides[j] == 0 && extents_[j].crossing) node.branch = static_cast<int>(j);
+      }
+      if (node.branch < 0) return;
+    }
+    node.sides = std::move(sides);
+    open.push(std::move(node));
+  }
+
+  // [m] by which the string would have to be moved to be on one side of a region altogether; 0 where it is.
+  double depth_in(const Extent& e) const {
+    double above = 0.0, under = 0.0;
+    for (auto k = static_cast<std::size_t>(e.first); k <= static_cast<std::size_t>(e.last); ++k) {
+      above = std::max(above, grid_.upper[k] - x_[k]);
+      under = std::max(under, x_[k] - grid_.lower[k]);
+    }
+    return std::min(above, under);
+  }
+
+  // [rad] of P's azimuth along x_: its ends, and how often it goes over the half-line of π.
+  double turn() const {
+    int turns = 0;
+    const std::size_t n = x_.size();
+    for (std::size_t k = 0; k + 1 < n; ++k) {
+      const double y0 = grid_.py[k], y1 = grid_.py[k + 1];
+      if ((y0 < 0.0) == (y1 < 0.0)) continue;
+      const double u0 = grid_.px[k] - x_[k], u1 = grid_.px[k + 1] - x_[k + 1];
+      if (u0 + (u1 - u0) * (y0 / (y0 - y1)) < 0.0) turns += y1 < 0.0 ? 1 : -1;
+    }
+    const auto azimuth = [&](std::size_t k) { return std::atan2(grid_.py[k] + 0.0, grid_.px[k] - x_[k]); };
+    return azimuth(n - 1) - azimuth(0) + 2.0 * kPi * turns;
+  }
+
+  // The law of the string last drawn.
+  void finish(CartLaw& law) const {
+    const auto m = static_cast<Eigen::Index>(grid_.sample.size());
+    law.x.resize(m);
+    law.lower.resize(m);
+    law.upper.resize(m);
+    for (Eigen::Index i = 0; i < m; ++i) {
+      const auto k = static_cast<std::size_t>(grid_.sample[static_cast<std::size_t>(i)]);
+      law.x[i] = x_[k];
+      law.lower[i] = grid_.lower[k];
+      law.upper[i] = grid_.upper[k];
+    }
+    // The string bends at its corners alone.
+    law.multipliers = VectorXd::Zero(m);
+    law.corners.reserve(corners_.size());
+    law.corner_x.reserve(corners_.size());
+    double before = 0.0;
+    for (std::size_t c = 0; c < corners_.size(); ++c) {
+      const auto a = static_cast<std::size_t>(corners_[c]);
+      law.corners.push_back(grid_.at[a]);
+      law.corner_x.push_back(x_[a]);
+      if (c + 1 == corners_.size()) break;
+      const auto b = static_cast<std::size_t>(corners_[c + 1]);
+      const double slope = (x_[b] - x_[a]) / (grid_.at[b] - grid_.at[a]);
+      law.energy += slope * (x_[b] - x_[a]);
+      const double at = grid_.at[a];
+      if (c > 0 && at == std::floor(at)) law.multipliers[static_cast<Eigen::Index>(at)] = before - slope;
+      before = slope;
+    }
+    for (const Extent& e : extents_) {
+      const auto first = static_cast<std::size_t>(e.first), last = static_cast<std::size_t>(e.last);
+      const std::size_t middle = first + (last - first) / 2;
+      law.regions.push_back({grid_.at[first], grid_.at[last], x_[middle] > grid_.px[middle] ? 1 : -1});
+    }
+    law.turn = turn();
+    law.strings = strings_;
+  }
+
+  Grid grid_;
+  double start_, end_, r_;
+  const CartOptions& options_;
+  double top_slope_;  // [m per sample]
+  std::vector<Extent> extents_;
+  std::vector<double> low_, high_, x_;
+  std::vector<int> corners_;
+  Funnel funnel_;
+  std::vector<signed char> drawn_;  // of the string in x_
+  int strings_ = 0;
+};
+
+double top_speed(const CartLaw& law, double dt) {
+  double top = 0.0;
+  for (std::size_t c = 0; c + 1 < law.corners.size(); ++c) {
+    top = std::max(top, std::abs(law.corner_x[c + 1] - law.corner_x[c]) / (law.corners[c + 1] - law.corners[c]));
+  }
+  return top / dt;
+}
+
+double top_acceleration(const CartLaw& law, double dt) {
+  double top = 0.0;
+  for (Eigen::Index i = 1; i + 1 < law.x.size(); ++i) {
+    top = std::max(top, std::abs(law.x[i + 1] - 2.0 * law.x[i] + law.x[i - 1]));
+  }
+  return top / (dt * dt);
+}
+
+Outcome solve(const PlanarPath& path, double start, double end, double r, const CartOptions& options) {
+  return Search(path, start, end, r, options).run();
+}
+
+// Which limit it is that leaves no way: the first one without which there is one.
+void explain(const PlanarPath& path, double start, double end, double r, const CartOptions& options, Outcome& out) {
+  CartOptions o = options;
+  o.max_speed = kInfinity;
+  Outcome without = solve(path, start, end, r, o);
+  if (!without.fault) {
+    const double speed = top_speed(without.law, options.duration / static_cast<double>(path.rows() - 1));
+    out.fault = CartFault::Speed;
+    out.facts = message("every way is faster than the cart's ", options.max_speed, " m/s: the shortest needs ", speed,
+                        " m/s, or a duration of ", options.duration * speed / options.max_speed, " s");
+    return;
+  }
+  o = options;
+  o.lower = -kInfinity;
+  o.upper = kInfinity;
+  without = solve(path, start, end, r, o);
+  if (!without.fault) {
+    out.fault = CartFault::Range;
+    out.facts = message("a turn of ", *options.turn, " rad needs the cart from ", without.law.x.minCoeff(), " to ",
+                        without.law.x.maxCoeff(), " m, out of its range [", options.lower, ", ", options.upper, "] m");
+    return;
+  }
+  out.fault = CartFault::Winding;
+  out.facts = message("no way turns the point about the first joint's axis by ", options.turn.value_or(kNaN),
+                      " rad, to within half a turn");
+  o = options;
+  o.turn.reset();
+  without = solve(path, start, end, r, o);
+  if (!without.fault) out.facts += message("; the shortest turns it by ", without.law.turn, " rad");
+}
+
+// The largest radius with a law: a smaller circle forbids less. NaN where a thousand millionth of it is still too much.
+double feasible_radius(const PlanarPath& path, double start, double end, double radius, const CartOptions& options) {
+  const auto feasible = [&](double r) { return !solve(path, start, end, r + options.margin, options).fault; };
+  double good = 1e-9 * radius, bad = radius;
+  if (!feasible(good)) return kNaN;
+  for (int i = 0; i < 60 && bad - good > 1e-10 * radius; ++i) {
+    const double middle = 0.5 * (good + bad);
+    (feasible(middle) ? good : bad) = middle;
+  }
+  return good;
+}
+
+void check(const PlanarPath& path, double start, double end, double radius, const CartOptions& o) {
+  require(path.rows() >= 2, "the path has ", path.rows(), " samples; it needs at least 2");
+  require(path.allFinite(), "the path must be finite");
+  require(std::isfinite(radius) && radius > 0.0, "radius = ", radius, " m must be finite and greater than 0");
+  require(std::isfinite(o.margin) && o.margin >= 0.0, "margin = ", o.margin, " m must be finite and not negative");
+  require(o.lower < o.upper, "the cart's range [", o.lower, ", ", o.upper, "] m is empty");
+  for (const auto& [name, value] : {std::pair{"start", start}, std::pair{"end", end}}) {
+    require(std::isfinite(value), name, " = ", value, " must be finite");
+    require(value >= o.lower && value <= o.upper, name, " = ", value, " m is out of the cart's range [", o.lower, ", ",
+            o.upper, "] m");
+  }
+  require(!o.turn || std::isfinite(*o.turn), "turn must be finite");
+  require(std::isfinite(o.duration) && o.duration > 0.0, "duration = ", o.duration, " s must be finite and greater than 0");
+  require(o.max_speed > 0.0, "max_speed = ", o.max_speed, " m/s must be greater than 0");
+  require(o.max_acceleration > 0.0, "max_acceleration = ", o.max_acceleration, " m/s² must be greater than 0");
+  require(o.max_strings >= 1, "max_strings = ", o.max_strings, " must be at least 1");
+}
+
+}  // namespace
+
+const char* to_string(CartFault fault) noexcept {
+  switch (fault) {
+    case CartFault::StartInside: return "start inside";
+    case CartFault::EndInside: return "end inside";
+    case CartFault::OppositeSides: return "opposite sides";
+    case CartFault::Range: return "range";
+    case CartFault::Winding: return "winding";
+    case CartFault::Speed: return "speed";
+    case CartFault::Acceleration: return "acceleration";
+    case CartFault::Undecided: return "undecided";
+  }
+  return "?";
+}
+
+void forbidden_intervals(const PlanarPath& path, double radius, VectorXd& lower, VectorXd& upper) {
+  lower.setConstant(path.rows(), kInfinity);
+  upper.setConstant(path.rows(), -kInfinity);
+  for (Eigen::Index i = 0; i < path.rows(); ++i) {
+    const double y = path(i, 1);
+    if (std::abs(y) >= radius) continue;
+    const double h = std::sqrt((radius - y) * (radius + y));
+    lower[i] = path(i, 0) - h;
+    upper[i] = path(i, 0) + h;
+  }
+}
+
+void taut_string(const VectorRef& at, const VectorRef& lower, const VectorRef& upper, VectorXd& x,
+                 std::vector<int>& corners) {
+  const Eigen::Index n = at.size();
+  require(n >= 2 && lower.size() == n && upper.size() == n, "at, lower and upper have ", n, ", ", lower.size(), " and ",
+          upper.size(), " entries; they need the same number, at least 2");
+  for (Eigen::Index i = 0; i < n; ++i) {
+    require(std::isfinite(at[i]) && (i == 0 || at[i] > at[i - 1]), "at must increase; entry ", i, " is ", at[i]);
+    require(lower[i] <= upper[i] && lower[i] < kInfinity && upper[i] > -kInfinity, "entry ", i,
+            " leaves no room: lower is ", lower[i], ", upper ", upper[i]);
+  }
+  for (const Eigen::Index i : {Eigen::Index{0}, n - 1}) {
+    require(lower[i] == upper[i], "at the ends lower and upper must be the same, not ", lower[i], " and ", upper[i]);
+  }
+  x.resize(n);
+  Funnel().draw(static_cast<int>(n), at.data(), lower.data(), upper.data(), x.data(), corners);
+}
+
+CartLaw cart_law(const PlanarPath& path, double start, double end, double radius, const CartOptions& options) {
+  check(path, start, end, radius, options);
+  const double r = radius + options.margin, dt = options.duration / static_cast<double>(path.rows() - 1);
+  Outcome out = solve(path, start, end, r, options);
+  if (!out.fault) {
+    const double acceleration = top_acceleration(out.law, dt);
+    if (acceleration <= options.max_acceleration) return std::move(out.law);
+    throw CartError(CartFault::Acceleration, kNaN,
+                    message("no cart motion (acceleration): the shortest way accelerates by ", acceleration,
+                            " m/s², the cart by ", options.max_acceleration, " m/s²; a duration of ",
+                            options.duration * std::sqrt(acceleration / options.max_acceleration), " s would do"));
+  }
+  if (*out.fault == CartFault::Winding) explain(path, start, end, r, options, out);
+  const double feasible = *out.fault == CartFault::Undecided ? kNaN : feasible_radius(path, start, end, radius, options);
+  std::string text = message("no cart motion (", to_string(*out.fault), "): ", out.facts);
+  if (std::isfinite(feasible)) {
+    text += message("; with a radius up to ", feasible, " m there is one");
+  } else if (*out.fault != CartFault::Undecided) {
+    text += "; no smaller radius helps";
+  }
+  throw CartError(*out.fault, feasible, text);
+}
+
+int cart_descent(const VectorRef& lower, const VectorRef& upper, VectorXd& x, const CartDescent& o) {
+  const Eigen::Index m = x.size();
+  require(m >= 2 && lower.size() == m && upper.size() == m, "lower, upper and x have ", lower.size(), ", ", upper.size(),
+          " and ", m, " entries; they need the same number, at least 2");
+  require(x.allFinite(), "the first guess must be finite");
+  require(std::isfinite(o.alpha) && o.alpha > 0.0, "alpha = ", o.alpha, " must be finite and greater than 0");
+  require(std::isfinite(o.step) && o.step > 0.0, "step = ", o.step, " must be finite and greater than 0");
+  require(o.max_iterations >= 1, "max_iterations = ", o.max_iterations, " must be at least 1");
+  require(std::isfinite(o.depth) && o.depth >= 0.0, "depth = ", o.depth, " mm must be finite and not negative");
+  constexpr double kMillimetres = 1e3;
+  // Centre, half width and slope of H; a half width of −1 where nothing is forbidden.
+  VectorXd centre(m), half(m), kick(m);
+  for (Eigen::Index i = 0; i < m; ++i) {
+    const bool any = lower[i] < upper[i];
+    centre[i] = any ? 0.5 * kMillimetres * (lower[i] + upper[i]) : 0.0;
+    half[i] = any ? 0.5 * kMillimetres * (upper[i] - lower[i]) : -1.0;
+    kick[i] = any ? o.step / half[i] : 0.0;
+  }
+  const double smooth = 2.0 * o.alpha * o.step;
+  VectorXd now = kMillimetres * x, next = now;
+  int done = 0;
+  while (done < o.max_iterations) {
+    double deepest = 0.0;
+    for (Eigen::Index i = 1; i + 1 < m; ++i) {
+      const double d = now[i] - centre[i], depth = half[i] - std::abs(d);
+      const double push = depth <= 0.0 || d == 0.0 ? 0.0 : d > 0.0 ? kick[i] : -kick[i];
+      deepest = std::max(deepest, depth);
+      next[i] = now[i] + push - smooth * (2.0 * now[i] - now[i - 1] - now[i + 1]);
+    }
+    if (o.until_admissible && deepest <= o.depth) break;
+    now.swap(next);
+    ++done;
+  }
+  const auto put = [&](Eigen::Index i) {
+    return now[i] > centre[i] ? std::max(now[i] / kMillimetres, upper[i]) : std::min(now[i] / kMillimetres, lower[i]);
+  };
+  const bool shallow = ((half - (now - centre).cwiseAbs()).segment(1, m - 2).array() <= o.depth).all();
+  for (Eigen::Index i = 1; i + 1 < m; ++i) x[i] = shallow && half[i] > 0.0 ? put(i) : now[i] / kMillimetres;
+  return done;
+}
+
+}  // namespace sigmaik::planning
