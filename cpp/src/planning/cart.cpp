@@ -19,31 +19,46 @@ constexpr double kPi = 3.14159265358979323846;
 constexpr double kNear = 1e-6;  // [samples] a tip keeps away from the samples beside it
 constexpr int kLeap = 16;       // points inside a region that lies between two samples
 
+struct GridPoint {
+  double px, py;        // P [m]
+  double lower, upper;  // λ∓ [m]; +∞, −∞ where nothing is forbidden
+};
+
+// A connected part of the forbidden region.
+struct Extent {
+  int first, last;   // in the grid
+  double low, high;  // least λ−, largest λ+ [m]
+  bool crossing;     // y changes its sign
+};
+
 // The samples, and between them what the region has there: its tips, and all of it where a step leaps over it.
 struct Grid {
-  std::vector<double> at;             // [samples]
-  std::vector<double> px, py;         // P [m]
-  std::vector<double> lower, upper;   // λ∓ [m]
-  std::vector<int> region;            // index, or −1
-  std::vector<int> sample;            // of the samples, where they are in here
-  int regions = 0;
-
-  int size() const { return static_cast<int>(at.size()); }
+  std::vector<double> at;  // [samples], whole numbers at samples
+  std::vector<GridPoint> points;
+  std::vector<Extent> extents;
 };
 
 Grid make_grid(const PlanarPath& path, double r) {
   const int m = static_cast<int>(path.rows());
   Grid g;
-  for (auto* v : {&g.at, &g.px, &g.py, &g.lower, &g.upper}) v->reserve(static_cast<std::size_t>(m) + kLeap);
-  g.region.reserve(static_cast<std::size_t>(m) + kLeap);
-  g.sample.reserve(static_cast<std::size_t>(m));
+  g.at.reserve(static_cast<std::size_t>(m + kLeap));
+  g.points.reserve(static_cast<std::size_t>(m + kLeap));
+  bool open = false;  // the last point is in the last extent, which may go on
   const auto add = [&](double at, double px, double py, double h) {
+    const int k = static_cast<int>(g.at.size());
     g.at.push_back(at);
-    g.px.push_back(px);
-    g.py.push_back(py);
-    g.lower.push_back(h >= 0.0 ? px - h : kInfinity);
-    g.upper.push_back(h >= 0.0 ? px + h : -kInfinity);
-    g.region.push_back(h >= 0.0 ? g.regions : -1);
+    g.points.push_back({px, py, h >= 0.0 ? px - h : kInfinity, h >= 0.0 ? px + h : -kInfinity});
+    if (h < 0.0) {
+      open = false;
+      return;
+    }
+    if (!open) g.extents.push_back({k, k, kInfinity, -kInfinity, false});
+    open = true;
+    Extent& e = g.extents.back();
+    e.last = k;
+    e.low = std::min(e.low, px - h);
+    e.high = std::max(e.high, px + h);
+    e.crossing = e.crossing || (py > 0.0) != (g.points[static_cast<std::size_t>(e.first)].py > 0.0);
   };
   // The point of the step from sample i where y has this value.
   const auto add_between = [&](int i, double y, double h) {
@@ -53,25 +68,17 @@ Grid make_grid(const PlanarPath& path, double r) {
   for (int i = 0; i < m; ++i) {
     const double x = path(i, 0), y = path(i, 1);
     const bool in = std::abs(y) < r;
-    g.sample.push_back(g.size());
     add(i, x, y, in ? std::sqrt((r - y) * (r + y)) : -1.0);
-    if (i + 1 == m) {
-      if (in) ++g.regions;
-      break;
-    }
+    if (i + 1 == m) break;
     const double next = path(i + 1, 1);
     const bool next_in = std::abs(next) < r;
-    if (in && !next_in) {
-      add_between(i, std::copysign(r, next), 0.0);
-      ++g.regions;
-    } else if (!in && next_in) {
-      add_between(i, std::copysign(r, y), 0.0);
-    } else if (!in && !next_in && (y > 0.0) != (next > 0.0)) {
+    if (in != next_in) {
+      add_between(i, std::copysign(r, in ? next : y), 0.0);
+    } else if (!in && (y > 0.0) != (next > 0.0)) {
       for (int k = 0; k <= kLeap; ++k) {
         const double angle = kPi * (static_cast<double>(k) / kLeap - 0.5), sign = y > 0.0 ? -1.0 : 1.0;
         add_between(i, sign * r * std::sin(angle), k % kLeap == 0 ? 0.0 : r * std::cos(angle));
       }
-      ++g.regions;
     }
   }
   return g;
@@ -177,7 +184,7 @@ class Search {
       }
       if (strings_ + 2 > options_.max_strings) {
         out.fault = CartFault::Undecided;
-        out.facts = message("the forbidden region has ", grid_.regions, " parts, and after ", strings_,
+        out.facts = message("the forbidden region has ", grid_.extents.size(), " parts, and after ", strings_,
                             " strings it is still open on which sides of them to pass");
         return out;
       }
@@ -199,38 +206,17 @@ class Search {
     std::vector<signed char> sides;
     bool operator<(const Node& other) const { return energy > other.energy; }  // the least first
   };
-  struct Extent {
-    int first, last;   // in the grid
-    double low, high;  // least λ−, largest λ+ [m]
-    bool crossing;     // y changes its sign
-  };
-
   bool room(int region, int side) const {
-    const Extent& e = extents_[static_cast<std::size_t>(region)];
+    const Extent& e = grid_.extents[static_cast<std::size_t>(region)];
     return side > 0 ? e.high <= options_.upper : e.low >= options_.lower;
   }
 
   // Sides that the ends decide. False, with the fault, where they cannot be.
   bool fix_sides(std::vector<signed char>& sides, Outcome& out) {
-    const int n = grid_.size();
-    extents_.assign(static_cast<std::size_t>(grid_.regions), {n, -1, kInfinity, -kInfinity, false});
-    std::vector<double> first_y(static_cast<std::size_t>(grid_.regions));
-    for (int i = 0; i < n; ++i) {
-      const auto k = static_cast<std::size_t>(i);
-      if (grid_.region[k] < 0) continue;
-      const auto j = static_cast<std::size_t>(grid_.region[k]);
-      Extent& e = extents_[j];
-      if (e.last < 0) {
-        e.first = i;
-        first_y[j] = grid_.py[k];
-      }
-      e.last = i;
-      e.low = std::min(e.low, grid_.lower[k]);
-      e.high = std::max(e.high, grid_.upper[k]);
-      e.crossing = e.crossing || (grid_.py[k] > 0.0) != (first_y[j] > 0.0);
-    }
-    const double start_distance = std::hypot(grid_.px.front() - start_, grid_.py.front());
-    const double end_distance = std::hypot(grid_.px.back() - end_, grid_.py.back());
+    const int n = static_cast<int>(grid_.at.size());
+    const GridPoint &head = grid_.points.front(), &tail = grid_.points.back();
+    const double start_distance = std::hypot(head.px - start_, head.py);
+    const double end_distance = std::hypot(tail.px - end_, tail.py);
     const auto inside = [&](CartFault fault, const char* which, double distance) {
       out.fault = fault;
       out.facts = message("the ", which, " is in the forbidden region: the point is ", distance,
@@ -239,11 +225,12 @@ class Search {
     if (start_distance <= r_) return inside(CartFault::StartInside, "start", start_distance), false;
     if (end_distance <= r_) return inside(CartFault::EndInside, "end", end_distance), false;
 
-    sides.assign(static_cast<std::size_t>(grid_.regions), 0);
-    for (int j = 0; j < grid_.regions; ++j) {
-      const Extent& e = extents_[static_cast<std::size_t>(j)];
-      const int at_start = e.first > 0 ? 0 : start_ > grid_.px.front() ? 1 : -1;
-      const int at_end = e.last + 1 < n ? 0 : end_ > grid_.px.back() ? 1 : -1;
+    const int regions = static_cast<int>(grid_.extents.size());
+    sides.assign(grid_.extents.size(), 0);
+    for (int j = 0; j < regions; ++j) {
+      const Extent& e = grid_.extents[static_cast<std::size_t>(j)];
+      const int at_start = e.first > 0 ? 0 : start_ > head.px ? 1 : -1;
+      const int at_end = e.last + 1 < n ? 0 : end_ > tail.px ? 1 : -1;
       if (at_start * at_end < 0) {
         out.fault = CartFault::OppositeSides;
         out.facts = message("the cart starts ", at_start > 0 ? "above" : "below", " the forbidden region and ends ",
@@ -268,16 +255,16 @@ class Search {
 
   // The taut string for these sides into x_, corners_.
   void draw(const std::vector<signed char>& sides) {
-    const auto n = static_cast<std::size_t>(grid_.size());
+    const std::size_t n = grid_.at.size();
     low_.assign(n, options_.lower);
     high_.assign(n, options_.upper);
     x_.resize(n);
     for (std::size_t j = 0; j < sides.size(); ++j) {
-      const auto first = static_cast<std::size_t>(extents_[j].first), last = static_cast<std::size_t>(extents_[j].last);
+      const auto first = static_cast<std::size_t>(grid_.extents[j].first), last = static_cast<std::size_t>(grid_.extents[j].last);
       if (sides[j] > 0) {
-        for (std::size_t k = first; k <= last; ++k) low_[k] = std::max(low_[k], grid_.upper[k]);
+        for (std::size_t k = first; k <= last; ++k) low_[k] = std::max(low_[k], grid_.points[k].upper);
       } else if (sides[j] < 0) {
-        for (std::size_t k = first; k <= last; ++k) high_[k] = std::min(high_[k], grid_.lower[k]);
+        for (std::size_t k = first; k <= last; ++k) high_[k] = std::min(high_[k], grid_.points[k].lower);
       }
     }
     low_.front() = high_.front() = start_;
@@ -301,7 +288,7 @@ class Search {
     double deepest = 0.0;
     for (std::size_t j = 0; j < sides.size(); ++j) {
       if (sides[j] != 0) continue;
-      const double depth = depth_in(extents_[j]);
+      const double depth = depth_in(grid_.extents[j]);
       if (depth > deepest) {
         deepest = depth;
         node.branch = static_cast<int>(j);
@@ -310,7 +297,7 @@ class Search {
     // Not in any: a law, if it turns the joint as asked. If not, on another side of a region where that makes a turn.
     if (node.branch < 0 && options_.turn && std::abs(turn() - *options_.turn) > kPi) {
       for (std::size_t j = 0; j < sides.size() && node.branch < 0; ++j) {
-        if (sides[j] == 0 && extents_[j].crossing) node.branch = static_cast<int>(j);
+        if (sides[j] == 0 && grid_.extents[j].crossing) node.branch = static_cast<int>(j);
       }
       if (node.branch < 0) return;
     }
@@ -322,8 +309,8 @@ class Search {
   double depth_in(const Extent& e) const {
     double above = 0.0, under = 0.0;
     for (auto k = static_cast<std::size_t>(e.first); k <= static_cast<std::size_t>(e.last); ++k) {
-      above = std::max(above, grid_.upper[k] - x_[k]);
-      under = std::max(under, x_[k] - grid_.lower[k]);
+      above = std::max(above, grid_.points[k].upper - x_[k]);
+      under = std::max(under, x_[k] - grid_.points[k].lower);
     }
     return std::min(above, under);
   }
@@ -333,26 +320,27 @@ class Search {
     int turns = 0;
     const std::size_t n = x_.size();
     for (std::size_t k = 0; k + 1 < n; ++k) {
-      const double y0 = grid_.py[k], y1 = grid_.py[k + 1];
+      const double y0 = grid_.points[k].py, y1 = grid_.points[k + 1].py;
       if ((y0 < 0.0) == (y1 < 0.0)) continue;
-      const double u0 = grid_.px[k] - x_[k], u1 = grid_.px[k + 1] - x_[k + 1];
+      const double u0 = grid_.points[k].px - x_[k], u1 = grid_.points[k + 1].px - x_[k + 1];
       if (u0 + (u1 - u0) * (y0 / (y0 - y1)) < 0.0) turns += y1 < 0.0 ? 1 : -1;
     }
-    const auto azimuth = [&](std::size_t k) { return std::atan2(grid_.py[k] + 0.0, grid_.px[k] - x_[k]); };
+    const auto azimuth = [&](std::size_t k) { return std::atan2(grid_.points[k].py + 0.0, grid_.points[k].px - x_[k]); };
     return azimuth(n - 1) - azimuth(0) + 2.0 * kPi * turns;
   }
 
   // The law of the string last drawn.
   void finish(CartLaw& law) const {
-    const auto m = static_cast<Eigen::Index>(grid_.sample.size());
+    const auto m = static_cast<Eigen::Index>(grid_.at.back()) + 1;
     law.x.resize(m);
     law.lower.resize(m);
     law.upper.resize(m);
-    for (Eigen::Index i = 0; i < m; ++i) {
-      const auto k = static_cast<std::size_t>(grid_.sample[static_cast<std::size_t>(i)]);
-      law.x[i] = x_[k];
-      law.lower[i] = grid_.lower[k];
-      law.upper[i] = grid_.upper[k];
+    for (std::size_t k = 0, i = 0; k < grid_.at.size(); ++k) {
+      if (grid_.at[k] != static_cast<double>(i)) continue;
+      const auto at = static_cast<Eigen::Index>(i++);
+      law.x[at] = x_[k];
+      law.lower[at] = grid_.points[k].lower;
+      law.upper[at] = grid_.points[k].upper;
     }
     // The string bends at its corners alone.
     law.multipliers = VectorXd::Zero(m);
@@ -371,10 +359,10 @@ class Search {
       if (c > 0 && at == std::floor(at)) law.multipliers[static_cast<Eigen::Index>(at)] = before - slope;
       before = slope;
     }
-    for (const Extent& e : extents_) {
+    for (const Extent& e : grid_.extents) {
       const auto first = static_cast<std::size_t>(e.first), last = static_cast<std::size_t>(e.last);
       const std::size_t middle = first + (last - first) / 2;
-      law.regions.push_back({grid_.at[first], grid_.at[last], x_[middle] > grid_.px[middle] ? 1 : -1});
+      law.regions.push_back({grid_.at[first], grid_.at[last], x_[middle] > grid_.points[middle].px ? 1 : -1});
     }
     law.turn = turn();
     law.strings = strings_;
@@ -384,7 +372,6 @@ class Search {
   double start_, end_, r_;
   const CartOptions& options_;
   double top_slope_;  // [m per sample]
-  std::vector<Extent> extents_;
   std::vector<double> low_, high_, x_;
   std::vector<int> corners_;
   Funnel funnel_;
