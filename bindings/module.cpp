@@ -57,4 +57,5 @@ PYBIND11_MODULE(_core, m) {
   bind_indices(m);
   bind_singularities(m);
   bind_planning(m);
+  bind_obstacles(m);
 }

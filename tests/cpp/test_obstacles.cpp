@@ -353,7 +353,16 @@ TEST_CASE("self-collision cost") {
     const std::vector<SpherePair> pairs = self_collision_pairs(spheres);
     CHECK(pairs == self_collision_pairs(spheres));
     CHECK(pairs.size() > 100);
-    left_out += self_collision_pairs(spheres, 1.0).size() - pairs.size();
+    // The arm as it is made is not near itself: some configurations cost nothing.
+    const JointCostPtr narrow = self_collision_cost(spheres, pairs, 0.02);
+    int free = 0;
+    for (int trial = 0; trial < 100; ++trial) {
+      const JointVector q = arm.limits().lower.cwiseMax(-2.0).cwiseMin(2.0) +
+                            random.uniform(0.3, 0.7) * (arm.limits().upper.cwiseMin(2.0) - arm.limits().lower.cwiseMax(-2.0));
+      if (narrow->value(q) == 0.0) ++free;
+    }
+    CHECK(free > 30);
+    left_out += self_collision_pairs(spheres, 0.02, 1.0).size() - pairs.size();
     const JointCostPtr cost = self_collision_cost(spheres, pairs, 0.05, 2.0);
     const int n = arm.dof();
     for (int trial = 0; trial < 300; ++trial) {
@@ -510,7 +519,8 @@ TEST_CASE("what is refused") {
   CHECK_THROWS_AS(sum_of({nullptr}), Error);
   CHECK_THROWS_AS(sum_of({joint_limit_cost(arm), joint_limit_cost(test::arms().at("ur10"))}), Error);
   const ArmSpheres spheres = ArmSpheres::along_links(arm);
-  CHECK_THROWS_AS(self_collision_pairs(spheres, 1.5), Error);
+  CHECK_THROWS_AS(self_collision_pairs(spheres, 0.02, 1.5), Error);
+  CHECK_THROWS_AS(self_collision_pairs(spheres, -0.1), Error);
   CHECK_THROWS_AS(self_collision_cost(spheres, {{0, spheres.size()}}), Error);
   CHECK_THROWS_AS(self_collision_cost(spheres, {{5, 5}}), Error);
   CHECK_THROWS_AS(collision_cost(ArmSpheres(arm, {{-1, Vector3d::Zero(), 0.1}}), field), Error);

@@ -298,8 +298,9 @@ JointCostPtr collision_cost(const ArmSpheres& spheres, const DistanceField& fiel
   return std::make_shared<CollisionCost>(spheres, field, clearance, weight);
 }
 
-std::vector<SpherePair> self_collision_pairs(const ArmSpheres& spheres, double most_contacts) {
+std::vector<SpherePair> self_collision_pairs(const ArmSpheres& spheres, double clearance, double most_contacts) {
   constexpr int kSamples = 1000;
+  require(std::isfinite(clearance) && clearance >= 0.0, "clearance = ", clearance, " must be finite and not negative");
   require(most_contacts >= 0.0 && most_contacts <= 1.0, "most_contacts = ", most_contacts, " must be from 0 to 1");
   std::vector<SpherePair> candidates, pairs;
   for (int far = 0; far < spheres.size(); ++far) {
@@ -314,9 +315,9 @@ std::vector<SpherePair> self_collision_pairs(const ArmSpheres& spheres, double m
     spheres.update(configurations(sample), state);
     for (std::size_t i = 0; i < candidates.size(); ++i) {
       const auto [near, far] = candidates[i];
-      const double radii = spheres.radius(near) + spheres.radius(far);
+      const double reach = spheres.radius(near) + spheres.radius(far) + clearance;
       const auto &a = state.center[static_cast<std::size_t>(near)], &b = state.center[static_cast<std::size_t>(far)];
-      if ((a - b).squaredNorm() < radii * radii) ++contacts[i];
+      if ((a - b).squaredNorm() < reach * reach) ++contacts[i];
     }
   }
   for (std::size_t i = 0; i < candidates.size(); ++i) {
