@@ -141,6 +141,14 @@ std::array<bool, 6> rows_argument(py::handle rows, const char* what) {
   return out;
 }
 
+Batch batch_argument(py::handle object, int n) {
+  const std::string need = "(" + std::to_string(n) + ",) or (B, " + std::to_string(n) + ")";
+  const py::array any = py::array::ensure(object);
+  if (!any) PyErr_Clear();
+  const bool many = any && any.ndim() == 2;
+  return {many ? array_argument(any, "q", {-1, n}, need.c_str()) : array_argument(object, "q", {n}, need.c_str()), many};
+}
+
 Task task_argument(py::handle mask, const std::string& frame) {
   Task task;
   if (!mask.is_none()) task.mask = rows_argument(mask, "mask");

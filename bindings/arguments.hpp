@@ -68,6 +68,14 @@ std::array<bool, 6> rows_argument(py::handle rows, const char* what);
 /// Mask (six truth values, None for all) and frame ("base" or "tool").
 Task task_argument(py::handle mask, const std::string& frame);
 
+/// Finite joint positions: one (n,), or many (B, n).
+struct SIGMAIK_HIDDEN Batch {
+  Array q;
+  bool many;
+  py::ssize_t count() const { return many ? q.shape(0) : 1; }
+};
+Batch batch_argument(py::handle object, int n);
+
 /// A new numpy array, in C order.
 template <typename Derived>
 py::array_t<double> to_numpy(const Eigen::MatrixBase<Derived>& values) {
@@ -87,18 +95,14 @@ py::array_t<double> to_numpy(const Eigen::MatrixBase<Derived>& values) {
 template <typename Fill>
 py::array_t<double> map_configurations(int n, const py::object& object, std::vector<py::ssize_t> shape,
                                        Fill fill) {
-  const std::string need = "(" + std::to_string(n) + ",) or (B, " + std::to_string(n) + ")";
-  py::array any = py::array::ensure(object);
-  if (!any) PyErr_Clear();
-  const bool batch = any && any.ndim() == 2;
-  const Array q = batch ? array_argument(any, "q", {-1, n}, need.c_str()) : array_argument(object, "q", {n}, need.c_str());
-  const py::ssize_t count = batch ? q.shape(0) : 1;
+  const Batch batch = batch_argument(object, n);
+  const py::ssize_t count = batch.count();
   py::ssize_t size = 1;
   for (const py::ssize_t length : shape) size *= length;
-  if (batch) shape.insert(shape.begin(), count);
+  if (batch.many) shape.insert(shape.begin(), count);
   py::array_t<double> out(shape);
   double* data = out.mutable_data();
-  const double* from = q.data();
+  const double* from = batch.q.data();
   {
     py::gil_scoped_release release;
     for (py::ssize_t b = 0; b < count; ++b) {
@@ -135,6 +139,7 @@ void bind_indices(py::module_& m);
 void bind_singularities(py::module_& m);
 void bind_planning(py::module_& m);
 void bind_cart(py::module_& m);
+void bind_obstacles(py::module_& m);
 
 }  // namespace sigmaik::bindings
 

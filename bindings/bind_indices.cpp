@@ -81,19 +81,15 @@ void bind_indices(py::module_& m) {
         const IndexFunction function = function_argument(index, k, length_scale);
         if (function.rows() != 0 && function.rows() != 6) throw Error("Σ must be (6, 6) for a chain");
         const int n = chain.dof();
-        py::array any = py::array::ensure(q);
-        if (!any) PyErr_Clear();
-        const std::string need = "(" + std::to_string(n) + ",) or (B, " + std::to_string(n) + ")";
-        const bool batch = any && any.ndim() == 2;
-        const Array all = batch ? array_argument(any, "q", {-1, n}, need.c_str()) : array_argument(q, "q", {n}, need.c_str());
-        const py::ssize_t count = batch ? all.shape(0) : 1;
-        py::array_t<double> value(batch ? std::vector<py::ssize_t>{count} : std::vector<py::ssize_t>{});
-        py::array_t<double> gradient(batch ? std::vector<py::ssize_t>{count, n} : std::vector<py::ssize_t>{n});
+        const Batch batch = batch_argument(q, n);
+        const py::ssize_t count = batch.count();
+        py::array_t<double> value(batch.many ? std::vector<py::ssize_t>{count} : std::vector<py::ssize_t>{});
+        py::array_t<double> gradient(batch.many ? std::vector<py::ssize_t>{count, n} : std::vector<py::ssize_t>{n});
         double* to = value.mutable_data();
         double* slope = gradient.mutable_data();
         {
           py::gil_scoped_release release;
-          evaluate(chain, function, static_cast<std::size_t>(count), all.data(), to, slope, threads);
+          evaluate(chain, function, static_cast<std::size_t>(count), batch.q.data(), to, slope, threads);
         }
         return py::make_tuple(value, gradient);
       },

@@ -20,6 +20,21 @@ py::array_t<double> nodes(const std::vector<double>& values, int n) {
   return out;
 }
 
+// q (B, n) → (B,), and (B, n) where gradients are asked for.
+py::array_t<double> evaluate_all(const JointCost& cost, const ArrayLike& q, int threads, bool gradients) {
+  const py::ssize_t n = cost.dof();
+  const Array all = array_argument(q, "q", {-1, n}, ("(B, " + std::to_string(n) + ")").c_str());
+  const py::ssize_t count = all.shape(0);
+  py::array_t<double> value(count), gradient({gradients ? count : 0, n});
+  double* const to = value.mutable_data();
+  double* const slope = gradients ? gradient.mutable_data() : nullptr;
+  {
+    py::gil_scoped_release release;
+    planning::evaluate(cost, static_cast<std::size_t>(count), all.data(), to, slope, threads);
+  }
+  return gradients ? gradient : value;
+}
+
 }  // namespace
 
 void bind_planning(py::module_& m) {
@@ -38,7 +53,15 @@ void bind_planning(py::module_& m) {
             const double value = c.model(joint_argument(q, "q", c.dof()), gradient, hessian);
             return py::make_tuple(value, to_numpy(gradient), to_numpy(hessian));
           },
-          py::arg("q"), "Cost, gradient (n,) and Hessian (n, n) at q (n,).");
+          py::arg("q"), "Cost, gradient (n,) and Hessian (n, n) at q (n,).")
+      .def(
+          "values",
+          [](const JointCost& c, const ArrayLike& q, int threads) { return evaluate_all(c, q, threads, false); },
+          py::arg("q"), py::arg("threads") = 1, "Costs (B,) at q (B, n), without the GIL.")
+      .def(
+          "gradients",
+          [](const JointCost& c, const ArrayLike& q, int threads) { return evaluate_all(c, q, threads, true); },
+          py::arg("q"), py::arg("threads") = 1, "Gradients (B, n) at q (B, n), without the GIL.");
 
   m.def(
       "potential_cost",

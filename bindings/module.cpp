@@ -58,4 +58,5 @@ PYBIND11_MODULE(_core, m) {
   bind_singularities(m);
   bind_planning(m);
   bind_cart(m);
+  bind_obstacles(m);
 }

@@ -184,3 +184,68 @@ def test_refusals_of_the_stochastic_one(change, text):
     home = sk.robots.home("franka_panda")
     with pytest.raises(ValueError, match=text):
         sk.planning.stochastic(sk.robots.load("franka_panda"), home, home + 0.1, **change)
+
+
+# A table in front of the arm: from under it to above it.
+@pytest.fixture(scope="module")
+def table():
+    arm = sk.robots.load("kuka_lbr_iiwa_14_r820")
+    obstacles = sk.planning.Obstacles([sk.planning.Box(size=(0.5, 1.0, 0.04), pose=(0.65, 0.0, 0.45))])
+    spheres = sk.planning.arm_spheres(arm)
+    rng = np.random.default_rng(0)
+
+    def configuration(low, high):
+        while True:
+            q = arm.random_configuration(rng)
+            x, y, z = arm.pose(q)[:3, 3]
+            near = 0.45 < x < 0.8 and abs(y) < 0.3 and low < z < high
+            if near and sk.planning.min_distance(spheres, obstacles, q) > 0.03:
+                return q
+
+    return arm, obstacles, spheres, [(configuration(0.1, 0.3), configuration(0.55, 0.9)) for _ in range(6)]
+
+
+@pytest.mark.parametrize("refine", [False, True])
+def test_around_a_table(table, refine):
+    arm, obstacles, spheres, tasks = table
+    means = []
+    for start, goal in tasks:
+        line = start + np.linspace(0, 1, 200)[:, None] * (goal - start)
+        for index in ("geometry_aware", None):
+            plan = sk.planning.stochastic(
+                arm, start, goal, obstacles, spheres=spheres, index=index, max_iterations=100, refine=refine
+            )
+            assert plan.status != "failed"
+            # Ten times finer than what the planner looks at.
+            q = plan.sample(np.linspace(0.0, plan.duration, 2001))[0]
+            assert np.min(sk.planning.min_distance(spheres, obstacles, q)) > -1e-3
+            means.append(np.mean(plan.clearance.manipulability))
+        assert np.min(sk.planning.min_distance(spheres, obstacles, line)) < 0.05
+    assert np.mean(means[0::2]) > 1.2 * np.mean(means[1::2])
+
+
+def test_what_touches_is_refused_or_fails(table):
+    arm, obstacles, spheres, tasks = table
+    start, goal = tasks[0]
+    inside = next(
+        q
+        for q in (arm.random_configuration(seed) for seed in range(10_000))
+        if sk.planning.min_distance(spheres, obstacles, q) < -0.01
+    )
+    for planner in PLANNERS:
+        with pytest.raises(ValueError, match="the goal is in collision"):
+            planner(arm, start, inside, obstacles, spheres=spheres)
+    # A wall that nothing goes through.
+    wall = sk.planning.Obstacles([sk.planning.Box(size=(3.0, 3.0, 0.04), pose=(1.7, 0.0, 0.45))])
+    for planner in PLANNERS:
+        plan = planner(arm, start, goal, wall, spheres=spheres, max_iterations=3)
+        assert plan.status == "failed"
+        assert plan.q.shape == (0, 7)
+
+
+def test_self_collision_may_be_switched_on():
+    arm = sk.robots.load("franka_panda")
+    rng = np.random.default_rng(1)
+    start, goal = arm.random_configuration(rng), arm.random_configuration(rng)
+    plan = sk.planning.gradient(arm, start, goal, self_collision=True)
+    assert plan.status in ("optimal", "feasible")

@@ -248,58 +248,15 @@ class JointLimitCost final : public JointCost {
   double weight_;
 };
 
-class Sum final : public JointCost {
- public:
-  explicit Sum(const std::vector<JointCostPtr>& costs) : costs_(costs) {
-    require(!costs.empty(), "a sum needs at least one cost");
-    for (const JointCostPtr& cost : costs) {
-      require(cost != nullptr, "a cost of the sum is missing");
-      require(cost->dof() == costs.front()->dof(), "the sum has costs of ", costs.front()->dof(), " and of ", cost->dof(),
-              " joints");
-    }
-  }
-  int dof() const noexcept override { return costs_.front()->dof(); }
-  double value(const JointRef& q) const noexcept override {
-    double sum = 0.0;
-    for (const JointCostPtr& cost : costs_) sum += cost->value(q);
-    return sum;
-  }
-  double gradient(const JointRef& q, JointVector& gradient) const noexcept override {
-    JointVector part(dof());
-    gradient.setZero(dof());
-    double sum = 0.0;
-    for (const JointCostPtr& cost : costs_) {
-      sum += cost->gradient(q, part);
-      gradient += part;
-    }
-    return sum;
-  }
-  double model(const JointRef& q, JointVector& gradient, JointMatrix& hessian) const noexcept override {
-    JointVector slope(dof());
-    JointMatrix curvature(dof(), dof());
-    gradient.setZero(dof());
-    hessian.setZero(dof(), dof());
-    double sum = 0.0;
-    for (const JointCostPtr& cost : costs_) {
-      sum += cost->model(q, slope, curvature);
-      gradient += slope;
-      hessian += curvature;
-    }
-    return sum;
-  }
-
- private:
-  std::vector<JointCostPtr> costs_;
-};
-
 }  // namespace
 
 JointCostPtr collision_cost(const ArmSpheres& spheres, const DistanceField& field, double clearance, double weight) {
   return std::make_shared<CollisionCost>(spheres, field, clearance, weight);
 }
 
-std::vector<SpherePair> self_collision_pairs(const ArmSpheres& spheres, double most_contacts) {
+std::vector<SpherePair> self_collision_pairs(const ArmSpheres& spheres, double clearance, double most_contacts) {
   constexpr int kSamples = 1000;
+  require(std::isfinite(clearance) && clearance >= 0.0, "clearance = ", clearance, " must be finite and not negative");
   require(most_contacts >= 0.0 && most_contacts <= 1.0, "most_contacts = ", most_contacts, " must be from 0 to 1");
   std::vector<SpherePair> candidates, pairs;
   for (int far = 0; far < spheres.size(); ++far) {
@@ -314,9 +271,9 @@ std::vector<SpherePair> self_collision_pairs(const ArmSpheres& spheres, double m
     spheres.update(configurations(sample), state);
     for (std::size_t i = 0; i < candidates.size(); ++i) {
       const auto [near, far] = candidates[i];
-      const double radii = spheres.radius(near) + spheres.radius(far);
+      const double reach = spheres.radius(near) + spheres.radius(far) + clearance;
       const auto &a = state.center[static_cast<std::size_t>(near)], &b = state.center[static_cast<std::size_t>(far)];
-      if ((a - b).squaredNorm() < radii * radii) ++contacts[i];
+      if ((a - b).squaredNorm() < reach * reach) ++contacts[i];
     }
   }
   for (std::size_t i = 0; i < candidates.size(); ++i) {
@@ -333,8 +290,6 @@ JointCostPtr self_collision_cost(const ArmSpheres& spheres, const std::vector<Sp
 JointCostPtr joint_limit_cost(const Chain& chain, double margin, double weight) {
   return std::make_shared<JointLimitCost>(chain, margin, weight);
 }
-
-JointCostPtr sum_of(const std::vector<JointCostPtr>& costs) { return std::make_shared<Sum>(costs); }
 
 double min_distance(const ArmSpheres& spheres, const DistanceField& field, const JointRef& q) noexcept {
   SphereState state;

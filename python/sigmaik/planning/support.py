@@ -7,15 +7,17 @@ import math
 import threading
 import time
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sigmaik import _core, indices, singularities
-from sigmaik._core import Chain, JointCost
+from sigmaik._core import ArmSpheres, Chain, DistanceField, JointCost
 
 from .clearance import clearance
+from .collision import arm_spheres, collision_cost, min_distance
+from .obstacles import Obstacles
 from .trajectory import Trajectory
 
 __all__ = ["Index", "gradient", "stochastic"]
@@ -31,12 +33,16 @@ def gradient(
     chain: Chain,
     start: ArrayLike,
     goal: ArrayLike,
-    obstacles: Any = None,
+    obstacles: Obstacles | DistanceField | None = None,
     *,
     index: Index | None = "geometry_aware",
     weight: float = 1.0,
     k: float | None = None,
     costs: tuple[JointCost, ...] = (),
+    spheres: ArmSpheres | None = None,
+    margin: float = 0.05,
+    obstacle_weight: float = 1e4,
+    self_collision: bool = False,
     states: int = 21,
     prior_weight: float = 10.0,
     max_iterations: int = 100,
@@ -54,7 +60,16 @@ def gradient(
     start, goal
         (n,) [rad or m] within the limits. Whole turns count.
     obstacles
-        Something with a method ``cost(chain)`` that gives a JointCost.
+        What to keep clear of. ValueError where start or goal touches it; where the motion found does, `status` is "failed"
+        and there are no samples.
+    spheres
+        The arm as spheres; by default `arm_spheres(chain)`, capsules along its links.
+    margin
+        [m] > 0 from obstacles that costs nothing (`collision_cost`).
+    obstacle_weight
+        [1/m] of what comes nearer, > 0.
+    self_collision
+        Whether the arm keeps clear of itself too.
     index
         "geometry_aware": ``weight ξ(q)``, ξ with Σ = kI (12), cut off at 2000. "manipulability": ``−weight log m(q)``, as in
         manipulability maximisation over a Gaussian-process trajectory (after Marić et al. 2019). None: neither.
@@ -76,26 +91,31 @@ def gradient(
     ValueError
         where an end or an option is out of its range.
     """
-    planner = _planner(chain, index, weight, k, states, obstacles, costs)
+    scene = _Scene.of(chain, obstacles, spheres, margin, obstacle_weight, self_collision, start, goal)
+    planner = _planner(chain, index, weight, k, states, (*costs, *scene.costs))
     begin = time.perf_counter()
     found = planner.gradient(
         start, goal, prior_weight=prior_weight, max_iterations=max_iterations, tolerance=tolerance
     )
     solve_time = time.perf_counter() - begin
-    return _trajectory(chain, found, prior_weight, "optimal" if found.converged else "feasible", duration, solve_time)
+    return _trajectory(chain, found, prior_weight, "optimal" if found.converged else "feasible", duration, solve_time, scene)
 
 
 def stochastic(
     chain: Chain,
     start: ArrayLike,
     goal: ArrayLike,
-    obstacles: Any = None,
+    obstacles: Obstacles | DistanceField | None = None,
     seed: int = 0,
     *,
     index: Index | None = "geometry_aware",
     weight: float = 1.0,
     k: float | None = None,
     costs: tuple[JointCost, ...] = (),
+    spheres: ArmSpheres | None = None,
+    margin: float = 0.05,
+    obstacle_weight: float = 1e4,
+    self_collision: bool = False,
     states: int = 21,
     samples: int = 10,
     max_iterations: int = 30,
@@ -123,7 +143,8 @@ def stochastic(
 
     Returns and raises as `gradient`; `status` is "feasible" unless refined: no minimum is claimed.
     """
-    planner = _planner(chain, index, weight, k, states, obstacles, costs)
+    scene = _Scene.of(chain, obstacles, spheres, margin, obstacle_weight, self_collision, start, goal)
+    planner = _planner(chain, index, weight, k, states, (*costs, *scene.costs))
     begin = time.perf_counter()
     found = planner.stochastic(
         start,
@@ -137,14 +158,16 @@ def stochastic(
         tolerance=tolerance,
         seed=seed,
     )
-    status = "feasible"
-    if refine:
-        found = planner.gradient(
-            start, goal, prior_weight=max(prior_weight, 1e-6), max_iterations=100, tolerance=1e-4, guess=found
-        )
-        status = "optimal" if found.converged else "feasible"
-    solve_time = time.perf_counter() - begin
-    return _trajectory(chain, found, prior_weight, status, duration, solve_time)
+    plan = _trajectory(chain, found, prior_weight, "feasible", duration, time.perf_counter() - begin, scene)
+    if not refine:
+        return plan
+    fine = planner.gradient(
+        start, goal, prior_weight=max(prior_weight, 1e-6), max_iterations=100, tolerance=1e-4, guess=found
+    )
+    status, solve_time = "optimal" if fine.converged else "feasible", time.perf_counter() - begin
+    refined = _trajectory(chain, fine, prior_weight, status, duration, solve_time, scene)
+    # Between its states a finer motion may touch what the rougher one did not.
+    return plan if refined.status == "failed" else refined
 
 
 class _Planners(threading.local):
@@ -175,16 +198,55 @@ def _planner(
     weight: float,
     k: float | None,
     states: int,
-    obstacles: Any,
-    costs: tuple[JointCost, ...],
+    further: tuple[JointCost, ...],
 ) -> _core.SupportPlanner:
-    further = [*costs, *([obstacles.cost(chain)] if obstacles is not None else [])]
     if index is not None and not further:
         return _planners.get(chain, index, weight, k, states)
     own = [] if index is None else [_index_cost(chain, index, weight, k)]
     if not own and not further:
-        raise ValueError("there is no cost: index is None, and neither obstacles nor costs are given")
+        raise ValueError("there is no cost: index is None, and neither obstacles nor other costs are given")
     return _core.SupportPlanner(chain, _core.sum_of_costs([*own, *further]), states)
+
+
+@dataclass(frozen=True)
+class _Scene:
+    """What a motion must not touch."""
+
+    spheres: ArmSpheres | None
+    obstacles: Obstacles | DistanceField | None
+    costs: tuple[JointCost, ...]
+
+    @staticmethod
+    def of(
+        chain: Chain,
+        obstacles: Obstacles | DistanceField | None,
+        spheres: ArmSpheres | None,
+        margin: float,
+        weight: float,
+        self_collision: bool,
+        start: ArrayLike,
+        goal: ArrayLike,
+    ) -> _Scene:
+        if obstacles is None and not self_collision:
+            return _Scene(None, None, ())
+        if spheres is None:
+            spheres = arm_spheres(chain)
+        costs = []
+        if obstacles is not None:
+            for name, q in (("start", start), ("goal", goal)):
+                distance = float(min_distance(spheres, obstacles, q))
+                if distance < 0.0:
+                    raise ValueError(f"the {name} is in collision: the arm is {-distance:.3f} m inside an obstacle")
+            costs.append(collision_cost(spheres, obstacles, margin, weight))
+        if self_collision:
+            costs.append(_core.self_collision_cost(spheres, weight=weight))
+        return _Scene(spheres, obstacles, tuple(costs))
+
+    def free(self, q: Array) -> bool:
+        """Whether no configuration (B, n) touches an obstacle."""
+        if self.spheres is None or self.obstacles is None:
+            return True
+        return bool(np.min(min_distance(self.spheres, self.obstacles, q)) >= 0.0)
 
 
 @dataclass(frozen=True)
@@ -265,6 +327,7 @@ def _trajectory(
     status: str,
     duration: float | None,
     solve_time: float,
+    scene: _Scene,
 ) -> Trajectory:
     q = found.states(chain.dof)
     spline = _within(chain, q)
@@ -290,4 +353,9 @@ def _trajectory(
         cubic=True,
     )
     dense = np.linspace(0.0, duration, DENSE * (len(t) - 1) + 1)
+    if not scene.free(plan.sample(dense)[0]):
+        none = np.empty((0, chain.dof))
+        return Trajectory(
+            np.empty(0), none, none, none, math.nan, "failed", math.nan, solve_time, found.iterations, cubic=True
+        )
     return replace(plan, clearance=clearance(chain, singularities.of(chain), dense, plan.sample(dense)[0]))

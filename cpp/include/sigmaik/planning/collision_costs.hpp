@@ -32,12 +32,13 @@ JointCostPtr collision_cost(const ArmSpheres& spheres, const DistanceField& fiel
 using SpherePair = std::array<int, 2>;
 
 /// Pairs of spheres that may come into contact: those of links that are not neighbours, i.e. with two or more joints
-/// between them, the base's included. Left out are those in contact at more than `most_contacts` of 1000 quasi-random
-/// configurations within the joint limits (±π where there are none): shapes that overlap by their make. The same on every
-/// machine; takes some ms.
-/// \param most_contacts 0 … 1
-/// \throws Error where it is out of its range
-std::vector<SpherePair> self_collision_pairs(const ArmSpheres& spheres, double most_contacts = 0.1);
+/// between them, the base's included. Left out are those nearer than `clearance` at more than a share `most_contacts` of
+/// 1000 quasi-random configurations within the joint limits (±π where there are none): they are so by their make. The same
+/// on every machine; takes some ms.
+/// \param clearance [m] ≥ 0, that of the cost   \param most_contacts 0 … 1
+/// \throws Error where one is out of its range
+std::vector<SpherePair> self_collision_pairs(const ArmSpheres& spheres, double clearance = 0.02,
+                                             double most_contacts = 0.1);
 
 /// weight · Σ c(d) over pairs of spheres, d the distance of their surfaces.
 /// \param clearance ε [m] > 0
@@ -50,10 +51,6 @@ JointCostPtr self_collision_cost(const ArmSpheres& spheres, const std::vector<Sp
 /// \param margin ≥ 0
 /// \throws Error where a parameter is out of its range
 JointCostPtr joint_limit_cost(const Chain& chain, double margin = 0.1, double weight = 1.0);
-
-/// The sum of some costs of the same number of joints.
-/// \throws Error where there is none, one is null, or they differ in their number of joints
-JointCostPtr sum_of(const std::vector<JointCostPtr>& costs);
 
 /// The least signed distance [m] from a sphere that a joint moves to the obstacles: below 0 there is contact. Real time;
 /// q must have chain().dof() finite entries.
