@@ -14,7 +14,7 @@ from sigmaik import _core
 from sigmaik._core import Chain
 
 from .cart import CartMotion, cart_motion
-from .cart_path import PosePath, pose_paths, smooth
+from .cart_path import PosePath, pose_paths, smooth, when_smooth
 
 __all__ = ["CartTrajectory", "Shape", "ShoulderCylinder", "cart_trajectory", "follow", "shoulder_cylinder"]
 
@@ -233,11 +233,10 @@ def cart_trajectory(
             max_speed=max_speed if profile == "constant" else max_speed / SMOOTH_SPEED,
             max_acceleration=max_acceleration if profile == "constant" else math.inf,
         )
-        time = np.linspace(0.0, 1.0, counts[k])
-        if profile == "constant":
-            # A corner of the law between samples becomes one.
-            time = np.union1d(time, motion.corners[motion.corners % 1.0 != 0.0] / (counts[k] - 1))
-        warp = smooth if profile == "smooth" else _same
+        warp, when = (smooth, when_smooth) if profile == "smooth" else (_same, _same)
+        # A corner of the law between samples becomes one.
+        between = motion.corners[motion.corners % 1.0 != 0.0] / (counts[k] - 1)
+        time = np.union1d(np.linspace(0.0, 1.0, counts[k]), when(between))
         joints, reached = follow(chain, _shifted(path, motion, warp, to_base, to_tip), time, rows[-1][-1, 1:])
         if reached < len(time):
             raise ValueError(
