@@ -205,7 +205,7 @@ def cart_trajectory(
     spans = _each("durations", durations, len(configurations) - 1)
     counts = [int(c) for c in _each("samples", samples, len(configurations) - 1)]
     if min(counts) < 2:
-        raise ValueError("a motion takes at least 2 samples")
+        raise ValueError(f"samples = {samples}: a motion takes at least 2")
     paths = pose_paths(targets, via, shape == "spline")
 
     # The point, in the frame of the tool, and seen from the first axis at cart position 0.
@@ -403,8 +403,9 @@ def _pose(name: str, pose: ArrayLike | None) -> Array:
     return out
 
 
-def _each(name: str, values: float | Sequence[float], count: int) -> list[float]:
-    out = [float(v) for v in ([values] * count if isinstance(values, int | float) else values)]
-    if len(out) != count or not all(math.isfinite(v) and v > 0.0 for v in out):
+def _each(name: str, values: ArrayLike, count: int) -> list[float]:
+    given = np.asarray(values, dtype=np.float64)
+    out = np.full(count, given) if given.ndim == 0 else given
+    if out.shape != (count,) or not np.all(np.isfinite(out) & (out > 0.0)):
         raise ValueError(f"{name} must be one number, or one for each of the {count} motions, greater than 0")
-    return out
+    return [float(v) for v in out]
