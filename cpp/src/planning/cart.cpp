@@ -28,7 +28,7 @@ struct GridPoint {
 struct Extent {
   int first, last;   // in the grid
   double low, high;  // least λ−, largest λ+ [m]
-  bool crossing;     // y changes its sign
+  int winding;       // turns of P's azimuth if the cart passes above, more than if it passes below: 1, 0 or −1
 };
 
 // The samples, and between them what the region has there: its tips, and all of it where a step leaps over it.
@@ -52,13 +52,14 @@ Grid make_grid(const PlanarPath& path, double r) {
       open = false;
       return;
     }
-    if (!open) g.extents.push_back({k, k, kInfinity, -kInfinity, false});
+    if (!open) g.extents.push_back({k, k, kInfinity, -kInfinity, 0});
     open = true;
     Extent& e = g.extents.back();
     e.last = k;
     e.low = std::min(e.low, px - h);
     e.high = std::max(e.high, px + h);
-    e.crossing = e.crossing || (py > 0.0) != (g.points[static_cast<std::size_t>(e.first)].py > 0.0);
+    const bool from_right = g.points[static_cast<std::size_t>(e.first)].py < 0.0;
+    e.winding = (py < 0.0) == from_right ? 0 : from_right ? -1 : 1;
   };
   // The point of the step from sample i where y has this value.
   const auto add_between = [&](int i, double y, double h) {
@@ -166,7 +167,9 @@ class Search {
  public:
   Search(const PlanarPath& path, double start, double end, double r, const CartOptions& options)
       : grid_(make_grid(path, r)), start_(start), end_(end), r_(r), options_(options),
-        top_slope_(options.max_speed * options.duration / static_cast<double>(path.rows() - 1)) {}
+        top_slope_(options.max_speed * options.duration / static_cast<double>(path.rows() - 1)) {
+    if (options.turn) turns_ = static_cast<int>(std::lround((*options.turn - ends_turn()) / (2.0 * kPi)));
+  }
 
   Outcome run() {
     Outcome out;
@@ -248,7 +251,8 @@ class Search {
         out.facts += message(", out of its range [", options_.lower, ", ", options_.upper, "] m");
         return false;
       }
-      sides[static_cast<std::size_t>(j)] = static_cast<signed char>(side);
+      const int only = room(j, 1) == room(j, -1) ? 0 : room(j, 1) ? 1 : -1;
+      sides[static_cast<std::size_t>(j)] = static_cast<signed char>(side != 0 ? side : only);
     }
     return true;
   }
@@ -276,6 +280,7 @@ class Search {
 
   // Draws the string, and keeps it where it can lead to a law.
   void push(std::priority_queue<Node>& open, std::vector<signed char> sides) {
+    if (options_.turn && !can_turn(sides)) return;
     draw(sides);
     Node node{0.0, -1, {}};
     for (std::size_t k = 0; k + 1 < corners_.size(); ++k) {
@@ -294,15 +299,49 @@ class Search {
         node.branch = static_cast<int>(j);
       }
     }
-    // Not in any: a law, if it turns the joint as asked. If not, on another side of a region where that makes a turn.
-    if (node.branch < 0 && options_.turn && std::abs(turn() - *options_.turn) > kPi) {
-      for (std::size_t j = 0; j < sides.size() && node.branch < 0; ++j) {
-        if (sides[j] == 0 && grid_.extents[j].crossing) node.branch = static_cast<int>(j);
-      }
-      if (node.branch < 0) return;
-    }
+    if (node.branch < 0 && options_.turn) node.branch = to_turn(sides);
     node.sides = std::move(sides);
     open.push(std::move(node));
+  }
+
+  // Side of a part of the region that the string passes.
+  int passes(std::size_t j) const {
+    const Extent& e = grid_.extents[j];
+    const auto middle = static_cast<std::size_t>(e.first + (e.last - e.first) / 2);
+    return x_[middle] > grid_.points[middle].px ? 1 : -1;
+  }
+
+  // Whether the sides still open leave room for the turn asked for. P's azimuth goes over the half-line of π where the cart
+  // passes above a part in which y changes its sign, and nowhere else.
+  bool can_turn(const std::vector<signed char>& sides) const {
+    int least = 0, most = 0;
+    for (std::size_t j = 0; j < sides.size(); ++j) {
+      const int w = grid_.extents[j].winding;
+      if (sides[j] >= 0) (w > 0 ? most : least) += w;
+      if (sides[j] > 0) (w > 0 ? least : most) += w;
+    }
+    return least <= turns_ && turns_ <= most;
+  }
+
+  // The part to branch on where the string is in none, but does not turn as asked: that with the least way to its other side.
+  int to_turn(const std::vector<signed char>& sides) const {
+    int missing = turns_, nearest = -1;
+    for (std::size_t j = 0; j < sides.size(); ++j) missing -= passes(j) > 0 ? grid_.extents[j].winding : 0;
+    double least = kInfinity;
+    for (std::size_t j = 0; j < sides.size() && missing != 0; ++j) {
+      const Extent& e = grid_.extents[j];
+      const int side = passes(j);
+      if (sides[j] != 0 || -side * e.winding * missing <= 0) continue;
+      double way = 0.0;
+      for (auto k = static_cast<std::size_t>(e.first); k <= static_cast<std::size_t>(e.last); ++k) {
+        way = std::max(way, side > 0 ? x_[k] - grid_.points[k].lower : grid_.points[k].upper - x_[k]);
+      }
+      if (way < least) {
+        least = way;
+        nearest = static_cast<int>(j);
+      }
+    }
+    return nearest;
   }
 
   // [m] by which the string would have to be moved to be on one side of a region altogether; 0 where it is.
@@ -315,6 +354,12 @@ class Search {
     return std::min(above, under);
   }
 
+  // [rad] from P's azimuth at the start to that at the end, both in (−π, π].
+  double ends_turn() const {
+    const auto azimuth = [](const GridPoint& p, double x) { return std::atan2(p.py + 0.0, p.px - x); };
+    return azimuth(grid_.points.back(), end_) - azimuth(grid_.points.front(), start_);
+  }
+
   // [rad] of P's azimuth along x_: its ends, and how often it goes over the half-line of π.
   double turn() const {
     int turns = 0;
@@ -325,8 +370,7 @@ class Search {
       const double u0 = grid_.points[k].px - x_[k], u1 = grid_.points[k + 1].px - x_[k + 1];
       if (u0 + (u1 - u0) * (y0 / (y0 - y1)) < 0.0) turns += y1 < 0.0 ? 1 : -1;
     }
-    const auto azimuth = [&](std::size_t k) { return std::atan2(grid_.points[k].py + 0.0, grid_.points[k].px - x_[k]); };
-    return azimuth(n - 1) - azimuth(0) + 2.0 * kPi * turns;
+    return ends_turn() + 2.0 * kPi * turns;
   }
 
   // The law of the string last drawn.
@@ -359,10 +403,9 @@ class Search {
       if (c > 0 && at == std::floor(at)) law.multipliers[static_cast<Eigen::Index>(at)] = before - slope;
       before = slope;
     }
-    for (const Extent& e : grid_.extents) {
-      const auto first = static_cast<std::size_t>(e.first), last = static_cast<std::size_t>(e.last);
-      const std::size_t middle = first + (last - first) / 2;
-      law.regions.push_back({grid_.at[first], grid_.at[last], x_[middle] > grid_.points[middle].px ? 1 : -1});
+    for (std::size_t j = 0; j < grid_.extents.size(); ++j) {
+      const Extent& e = grid_.extents[j];
+      law.regions.push_back({grid_.at[static_cast<std::size_t>(e.first)], grid_.at[static_cast<std::size_t>(e.last)], passes(j)});
     }
     law.turn = turn();
     law.strings = strings_;
@@ -372,6 +415,7 @@ class Search {
   double start_, end_, r_;
   const CartOptions& options_;
   double top_slope_;  // [m per sample]
+  int turns_ = 0;     // asked for, of P's azimuth over the half-line of π
   std::vector<double> low_, high_, x_;
   std::vector<int> corners_;
   Funnel funnel_;
@@ -453,7 +497,7 @@ void check(const PlanarPath& path, double start, double end, double radius, cons
     require(value >= o.lower && value <= o.upper, name, " = ", value, " m is out of the cart's range [", o.lower, ", ",
             o.upper, "] m");
   }
-  require(!o.turn || std::isfinite(*o.turn), "turn must be finite");
+  require(!o.turn || std::abs(*o.turn) <= 1e6, "turn = ", o.turn.value_or(kNaN), " rad must be within a million");
   require(std::isfinite(o.duration) && o.duration > 0.0, "duration = ", o.duration, " s must be finite and greater than 0");
   require(o.max_speed > 0.0, "max_speed = ", o.max_speed, " m/s must be greater than 0");
   require(o.max_acceleration > 0.0, "max_acceleration = ", o.max_acceleration, " m/s² must be greater than 0");

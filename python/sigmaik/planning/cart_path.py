@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sigmaik import _core
 
-__all__ = ["PosePath", "pose_paths", "smooth"]
+__all__ = ["PosePath", "pose_paths", "smooth", "when_smooth"]
 
 Array = NDArray[np.float64]
 
@@ -42,6 +42,16 @@ def pose_paths(poses: Array, via: Sequence[ArrayLike | None] | None, spline: boo
 def smooth(time: Array) -> Array:
     """s in [0, 1] over time in [0, 1], at rest with no acceleration at both ends; ṡ is at most 1.875."""
     return time**3 * (10.0 + time * (6.0 * time - 15.0))
+
+
+def when_smooth(s: Array) -> Array:
+    """The time in [0, 1] at which `smooth` is at s in [0, 1], by bisection."""
+    low, high = np.zeros_like(s), np.ones_like(s)
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        early = smooth(middle) < s
+        low, high = np.where(early, middle, low), np.where(early, high, middle)
+    return 0.5 * (low + high)
 
 
 def _path(position: Callable[[Array], Array], first: Array, last: Array) -> PosePath:

@@ -14,7 +14,7 @@ from sigmaik import _core
 from sigmaik._core import Chain
 
 from .cart import CartMotion, cart_motion
-from .cart_path import PosePath, pose_paths, smooth
+from .cart_path import PosePath, pose_paths, smooth, when_smooth
 
 __all__ = ["CartTrajectory", "Shape", "ShoulderCylinder", "cart_trajectory", "follow", "shoulder_cylinder"]
 
@@ -205,7 +205,7 @@ def cart_trajectory(
     spans = _each("durations", durations, len(configurations) - 1)
     counts = [int(c) for c in _each("samples", samples, len(configurations) - 1)]
     if min(counts) < 2:
-        raise ValueError("a motion takes at least 2 samples")
+        raise ValueError(f"samples = {samples}: a motion takes at least 2")
     paths = pose_paths(targets, via, shape == "spline")
 
     # The point, in the frame of the tool, and seen from the first axis at cart position 0.
@@ -233,11 +233,10 @@ def cart_trajectory(
             max_speed=max_speed if profile == "constant" else max_speed / SMOOTH_SPEED,
             max_acceleration=max_acceleration if profile == "constant" else math.inf,
         )
-        time = np.linspace(0.0, 1.0, counts[k])
-        if profile == "constant":
-            # A corner of the law between samples becomes one.
-            time = np.union1d(time, motion.corners[motion.corners % 1.0 != 0.0] / (counts[k] - 1))
-        warp = smooth if profile == "smooth" else _same
+        warp, when = (smooth, when_smooth) if profile == "smooth" else (_same, _same)
+        # A corner of the law between samples becomes one.
+        between = motion.corners[motion.corners % 1.0 != 0.0] / (counts[k] - 1)
+        time = np.union1d(np.linspace(0.0, 1.0, counts[k]), when(between))
         joints, reached = follow(chain, _shifted(path, motion, warp, to_base, to_tip), time, rows[-1][-1, 1:])
         if reached < len(time):
             raise ValueError(
@@ -404,8 +403,9 @@ def _pose(name: str, pose: ArrayLike | None) -> Array:
     return out
 
 
-def _each(name: str, values: float | Sequence[float], count: int) -> list[float]:
-    out = [float(v) for v in ([values] * count if isinstance(values, int | float) else values)]
-    if len(out) != count or not all(math.isfinite(v) and v > 0.0 for v in out):
+def _each(name: str, values: ArrayLike, count: int) -> list[float]:
+    given = np.asarray(values, dtype=np.float64)
+    out = np.full(count, given) if given.ndim == 0 else given
+    if out.shape != (count,) or not np.all(np.isfinite(out) & (out > 0.0)):
         raise ValueError(f"{name} must be one number, or one for each of the {count} motions, greater than 0")
-    return out
+    return [float(v) for v in out]
