@@ -2,11 +2,12 @@
 The compiled part of sigmaik. Import sigmaik instead.
 """
 from __future__ import annotations
+import collections.abc
 import enum
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['AdaptiveDampedLeastSquares', 'AnalyticBranch', 'AnalyticIk', 'Chain', 'ConstrainedIk', 'ConstrainedIkStep', 'DEFAULT_SCALE', 'DampedLeastSquares', 'Dynamics', 'Error', 'JParse', 'JacobianProjection', 'JacobianSafety', 'JacobianSafetyProjection', 'JointCost', 'JointLimits', 'LeastSquaresSolution', 'PseudoInverse', 'SelectivelyDampedLeastSquares', 'Servo', 'ServoStep', 'SingularSets', 'Solution', 'Spectrum', 'Status', 'TimeOptimal', 'TimeOptimalResult', 'VelocitySolver', 'evaluate_index', 'index_of_jacobian', 'known_singular_sets', 'least_squares', 'load_singular_sets', 'manipulability_cost', 'pose_error', 'potential_cost', 'reference_scale', 'rotation_exp', 'rotation_log', 'singular_sets_of', 'solve_batch']
+__all__: list[str] = ['AdaptiveDampedLeastSquares', 'AnalyticBranch', 'AnalyticIk', 'ArmSpheres', 'Chain', 'ConstrainedIk', 'ConstrainedIkStep', 'DEFAULT_SCALE', 'DampedLeastSquares', 'DistanceField', 'Dynamics', 'Error', 'JParse', 'JacobianProjection', 'JacobianSafety', 'JacobianSafetyProjection', 'JointCost', 'JointLimits', 'LeastSquaresSolution', 'PseudoInverse', 'SelectivelyDampedLeastSquares', 'Servo', 'ServoStep', 'SingularSets', 'Solution', 'Spectrum', 'Status', 'TimeOptimal', 'TimeOptimalResult', 'VelocitySolver', 'collision_cost', 'evaluate_index', 'index_of_jacobian', 'joint_limit_cost', 'known_singular_sets', 'least_squares', 'load_singular_sets', 'manipulability_cost', 'min_distance', 'pose_error', 'potential_cost', 'reference_scale', 'rotation_exp', 'rotation_log', 'self_collision_cost', 'self_collision_pairs', 'singular_sets_of', 'solve_batch', 'sum_of']
 class Error(ValueError):
     """
     What set-up and checked calls refuse. The text carries the facts.
@@ -884,6 +885,10 @@ class JointCost:
     """
     A smooth cost of joint positions, with its derivatives.
     """
+    def gradients(self, q: numpy.typing.ArrayLike, threads: typing.SupportsInt | typing.SupportsIndex = 1) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Gradients (B, n) at q (B, n), without the GIL.
+        """
     def model(self, q: numpy.typing.ArrayLike) -> tuple[float, numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
         """
         Cost, gradient (n,) and Hessian (n, n) at q (n,).
@@ -891,6 +896,10 @@ class JointCost:
     def value(self, q: numpy.typing.ArrayLike) -> float:
         """
         Cost at q (n,).
+        """
+    def values(self, q: numpy.typing.ArrayLike, threads: typing.SupportsInt | typing.SupportsIndex = 1) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Costs (B,) at q (B, n), without the GIL.
         """
     @property
     def dof(self) -> int:
@@ -950,6 +959,103 @@ class TimeOptimal:
 
         Raises Error where an end is outside its limits. One call at a time for each object.
         """
+class DistanceField:
+    """
+    Signed distances [m] to obstacles on a regular grid, interpolated trilinearly: positive in
+    free space, negative inside. Outside the grid: continuous, growing, and no more than the
+    distance to what lies within.
+    """
+    def __init__(self, distances: numpy.typing.ArrayLike, origin: numpy.typing.ArrayLike, cell: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        """
+        distances (X, Y, Z) [m] at the nodes, the first of which is at `origin` (3,) [m] in the axes of the arm's base;
+        `cell` [m] from node to node.
+        """
+    def __repr__(self) -> str:
+        ...
+    def distance(self, points: numpy.typing.ArrayLike) -> float | numpy.typing.NDArray[numpy.float64]:
+        """
+        [m] at a point (3,), or (M,) at points (M, 3).
+        """
+    def gradient(self, points: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Gradient (3,) of the distance at a point (3,), or (M, 3) at points (M, 3).
+        """
+    @property
+    def cell(self) -> float:
+        """
+        [m]
+        """
+    @property
+    def origin(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3,) [m] of the first node.
+        """
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """
+        Nodes along each axis.
+        """
+class ArmSpheres:
+    """
+    An arm as S spheres fixed to its links, in the order in which joints move them, base to tip.
+
+    `sigmaik.planning.arm_spheres` makes them from a URDF, or along the links.
+    """
+    @staticmethod
+    def along_links(chain: Chain, radius: typing.SupportsFloat | typing.SupportsIndex = 0.05) -> ArmSpheres:
+        """
+        Capsules from each link's frame to the next.
+        """
+    @staticmethod
+    def from_urdf(chain: Chain, source: typing.Any, radius: typing.SupportsFloat | typing.SupportsIndex = 0.05) -> ArmSpheres:
+        """
+        Covers the boxes, cylinders and spheres of a URDF; links with meshes as along_links does.
+        """
+    def __init__(self, chain: Chain, links: collections.abc.Sequence[str], centers: numpy.typing.ArrayLike, radii: numpy.typing.ArrayLike) -> None:
+        """
+        links: the name of each sphere's link; centers (S, 3) [m] in the link's frame; radii (S,) [m].
+        """
+    def __len__(self) -> int:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def centers(self, q: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (S, 3) [m] in the base's axes at q (n,); (B, S, 3) at q (B, n).
+        """
+    def jacobians(self, q: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        ∂center/∂q (S, 3, n) at q (n,); (B, S, 3, n) at q (B, n).
+        """
+    @property
+    def chain(self) -> Chain:
+        """
+        The arm.
+        """
+    @property
+    def first_moving(self) -> int:
+        """
+        The first sphere that a joint moves; those before it belong to the base.
+        """
+    @property
+    def links(self) -> tuple[str, ...]:
+        """
+        The name of each sphere's link.
+        """
+    @property
+    def local_centers(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (S, 3) [m] in the link's frame.
+        """
+    @property
+    def radii(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (S,) [m]
+        """
+def collision_cost(spheres: ArmSpheres, field: DistanceField, clearance: typing.SupportsFloat | typing.SupportsIndex = 0.05, weight: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> JointCost:
+    """
+    weight · Σ c(d) over the spheres that move, d the signed distance of their surfaces to the obstacles.
+    """
 def evaluate_index(chain: Chain, q: numpy.typing.ArrayLike, index: str, k: numpy.typing.ArrayLike = 6.0, length_scale: typing.SupportsFloat | typing.SupportsIndex = 1.0, threads: typing.SupportsInt | typing.SupportsIndex = 1) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
     """
     Values () or (B,) and gradients (n,) or (B, n) at q (n,) or (B, n).
@@ -957,6 +1063,10 @@ def evaluate_index(chain: Chain, q: numpy.typing.ArrayLike, index: str, k: numpy
 def index_of_jacobian(J: numpy.typing.ArrayLike, index: str, k: numpy.typing.ArrayLike = 6.0, length_scale: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> float | numpy.typing.NDArray[numpy.float64]:
     """
     An index of J (m, n), or (B,) of J (B, m, n).
+    """
+def joint_limit_cost(chain: Chain, margin: typing.SupportsFloat | typing.SupportsIndex = 0.1, weight: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> JointCost:
+    """
+    weight · Σ ½x², x the way by which a joint is nearer to a limit than `margin` [rad or m], or beyond it.
     """
 def known_singular_sets() -> tuple[str, ...]:
     ...
@@ -980,6 +1090,10 @@ def manipulability_cost(sets: SingularSets, weight: typing.SupportsFloat | typin
 def manipulability_cost(chain: Chain, weight: typing.SupportsFloat | typing.SupportsIndex, epsilon: typing.SupportsFloat | typing.SupportsIndex) -> JointCost:
     """
     weight/(m(q) + ε), m from the Jacobian.
+    """
+def min_distance(spheres: ArmSpheres, field: DistanceField, q: numpy.typing.ArrayLike, threads: typing.SupportsInt | typing.SupportsIndex = 1) -> float | numpy.typing.NDArray[numpy.float64]:
+    """
+    The least signed distance [m] from a sphere that moves to the obstacles at q (n,), or (B,) at q (B, n).
     """
 def pose_error(current: typing.Any, target: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
     """
@@ -1005,6 +1119,17 @@ def rotation_log(rotation: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy
     """
     Axis times angle [rad] (3,) of a 3×3 rotation, angle in [0, π].
     """
+def self_collision_cost(spheres: ArmSpheres, pairs: numpy.typing.ArrayLike | None = None, clearance: typing.SupportsFloat | typing.SupportsIndex = 0.02, weight: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> JointCost:
+    """
+    weight · Σ c(d) over pairs of spheres (P, 2), by default `self_collision_pairs(spheres, clearance)`;
+    d the distance of their surfaces, c(d) as in `collision_cost`.
+    """
+def self_collision_pairs(spheres: ArmSpheres, clearance: typing.SupportsFloat | typing.SupportsIndex = 0.02, most_contacts: typing.SupportsFloat | typing.SupportsIndex = 0.1) -> numpy.typing.NDArray[numpy.int32]:
+    """
+    (P, 2) spheres of links that are not neighbours, but for those nearer than `clearance` [m] at more than a share
+    `most_contacts` (0 … 1) of a thousand configurations within the joint limits. The same on every machine; takes some
+    ms.
+    """
 def singular_sets_of(chain: Chain) -> SingularSets | None:
     ...
 def solve_batch(method: PseudoInverse | DampedLeastSquares | AdaptiveDampedLeastSquares | SelectivelyDampedLeastSquares | JParse | JacobianProjection | JacobianSafety | JacobianSafetyProjection, J: numpy.typing.ArrayLike, twist: numpy.typing.ArrayLike, length_scale: typing.SupportsFloat | typing.SupportsIndex = 1.0, threads: typing.SupportsInt | typing.SupportsIndex = 1) -> numpy.typing.NDArray[numpy.float64]:
@@ -1013,6 +1138,10 @@ def solve_batch(method: PseudoInverse | DampedLeastSquares | AdaptiveDampedLeast
 
     Each is solved as by a fresh VelocitySolver, so order and number of threads do not change the answers.
     Raises Error where a shape is wrong or an entry is not finite.
+    """
+def sum_of(costs: collections.abc.Sequence[JointCost]) -> JointCost:
+    """
+    The sum of costs of the same joints.
     """
 DEFAULT_SCALE: float = 6.0
 __version__: str

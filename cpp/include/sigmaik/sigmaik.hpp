@@ -25,6 +25,9 @@
 ///     constrained_ik.hpp   ConstrainedIk: a pose exactly in part, the rest as limits allow; time scaling (not included)
 ///     planning/time_optimal.hpp  TimeOptimal: motions within limits, away from what a cost marks (not included)
 ///     planning/costs.hpp         costs for it: potentials, manipulability (not included)
+///     planning/distance_field.hpp   DistanceField: signed distances to obstacles on a grid (not included)
+///     planning/arm_spheres.hpp      ArmSpheres: an arm as spheres, from a URDF's shapes or along its links (not included)
+///     planning/collision_costs.hpp  costs of obstacles, the arm itself, joint limits; min_distance (not included)
 ///
 /// Set-up throws Error. Calls marked "real time" are noexcept, bounded, and touch neither heap nor lock.
 
