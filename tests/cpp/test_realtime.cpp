@@ -7,6 +7,8 @@
 #include <string>
 
 #include <sigmaik/constrained_ik.hpp>
+#include <sigmaik/planning/collision_costs.hpp>
+#include <sigmaik/planning/costs.hpp>
 #include <sigmaik/sigmaik.hpp>
 
 #include "random.hpp"
@@ -170,5 +172,29 @@ TEST_CASE("closed forms and torque limits in constrained inverse kinematics pass
       for (int cycle = 0; cycle < 400; ++cycle) sum += ik.step(cycle < 200 ? near : far).qdot.sum();
     }
     CHECK(std::isfinite(sum));
+  }
+}
+
+TEST_CASE("costs of collisions of every size pass Eigen's checks") {
+  using namespace sigmaik::planning;
+  test::Random random(11);
+  std::vector<double> distances(4 * 5 * 6);
+  for (double& d : distances) d = random.uniform(-0.5, 0.5);
+  const DistanceField field(distances, {4, 5, 6}, Eigen::Vector3d(-1.0, -1.0, -1.0), 0.4);
+  for (int n = 2; n <= sigmaik::kMaxJoints; ++n) {
+    const sigmaik::Chain chain = random.chain(n, 0.3);
+    const ArmSpheres spheres = ArmSpheres::along_links(chain, 0.1);
+    const JointCostPtr cost = sum_of_costs({collision_cost(spheres, field, 0.5), joint_limit_cost(chain),
+                                      self_collision_cost(spheres, self_collision_pairs(spheres, 0.3, 1.0), 0.3)});
+    const sigmaik::JointVector q = random.configuration(n);
+    sigmaik::JointVector gradient(n);
+    sigmaik::JointMatrix hessian(n, n);
+    double sum = 0.0;
+    {
+      const NoMalloc none;
+      sum += cost->value(q) + cost->gradient(q, gradient) + cost->model(q, gradient, hessian);
+      sum += min_distance(spheres, field, q);
+    }
+    CHECK(std::isfinite(sum + gradient.sum() + hessian.sum()));
   }
 }

@@ -241,3 +241,16 @@ def test_arm_as_in_pinocchio(name, tip, dof):
         np.testing.assert_allclose(
             chain.jacobian(q), jacobian[:, [model.idx_vs[i] for i in ids]], rtol=0, atol=TOLERANCE
         )
+
+
+@pytest.mark.parametrize(("name", "tip", "dof"), ARMS, ids=IDS)
+def test_spheres(name, tip, dof):
+    """Their shapes are meshes for the most part: capsules stand in, from the base to the tip."""
+    arm = sk.Chain.from_urdf(FILES[name], tip=tip)
+    spheres = sk.planning.arm_spheres(arm, FILES[name])
+    assert dof < len(spheres) <= 256
+    assert np.all((spheres.radii > 0.0) & (spheres.radii < 0.5))
+    assert len(spheres.links) - spheres.first_moving >= dof - 1
+    q = np.zeros(dof)
+    assert spheres.jacobians(q).shape == (len(spheres), 3, dof)
+    assert np.all(np.linalg.norm(spheres.centers(q), axis=1) < 5.0)

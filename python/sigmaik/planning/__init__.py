@@ -18,6 +18,7 @@ from sigmaik._core import (
     joint_limit_cost,
     self_collision_cost,
     self_collision_pairs,
+    sum_of_costs,
 )
 
 from .cart import CartError, CartMotion, CartRegion, cart_motion, evaluate_cart_motion
@@ -57,5 +58,6 @@ __all__ = [
     "self_collision_pairs",
     "shoulder_cylinder",
     "stochastic",
+    "sum_of_costs",
     "time_optimal",
 ]

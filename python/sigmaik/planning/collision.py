@@ -40,7 +40,7 @@ def collision_cost(
 ) -> JointCost:
     """weight · Σ c(d) over the spheres that move, d the signed distance of their surfaces to the obstacles.
 
-    With ε the `clearance` [m] > 0 (Zucker et al. 2013, eq. 21):
+    With ε the `clearance` [m] > 0, as CHOMP has it (Ratliff et al. 2009; Zucker et al. 2013):
 
         c(d) = 0   d ≥ ε,        (ε − d)²/(2ε)   0 ≤ d < ε,        ε/2 − d   d < 0
 

@@ -32,7 +32,7 @@ class Box:
     def __post_init__(self) -> None:
         _store(self, size=_numbers("size", self.size, (3,)), pose=_pose(self.pose))
         if not np.all(np.asarray(self.size) > 0.0):
-            raise Error(f"a box of size {np.asarray(self.size)}: its sides must be above 0")
+            raise Error(f"a box of size {self.size!r}: its sides must be above 0")
 
     def distance(self, points: ArrayLike) -> Array:
         """Signed distance (…) [m] of points (…, 3), exact."""
@@ -193,7 +193,7 @@ class Obstacles:
         Error where no cell is occupied, or none is free; where SciPy is not installed, with the name of the extra.
         """
         try:
-            from scipy.ndimage import distance_transform_edt
+            from scipy.ndimage import distance_transform_edt  # type: ignore[import-untyped]
         except ImportError as error:
             raise Error("an occupancy grid needs SciPy: pip install 'sigmaik[obstacles]'") from error
         inside = np.asarray(occupied)

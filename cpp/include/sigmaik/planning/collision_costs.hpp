@@ -2,7 +2,8 @@
 /// \file collision_costs.hpp
 /// Costs that keep a plan off obstacles, off the arm itself, and off its joint limits.
 ///
-/// All are sums of hinges of a distance d that is to be at least ε, the clearance (Zucker et al. 2013, eq. 21):
+/// Collisions are sums of hinges of distances d that are to be at least ε, the clearance, as CHOMP has them (Ratliff et al.
+/// 2009; Zucker et al. 2013):
 ///
 ///     c(d) = 0   d ≥ ε,        (ε − d)²/(2ε)   0 ≤ d < ε,        ε/2 − d   d < 0
 ///
