@@ -24,6 +24,14 @@ void cart_law_line(benchmark::State& state) {
 }
 BENCHMARK(cart_law_line)->Arg(500)->Arg(5068)->Arg(50000)->Unit(benchmark::kMicrosecond);
 
+// From rest to rest, where the acceleration is limited: an interior-point method instead of a string.
+void cart_law_limited(benchmark::State& state) {
+  const PlanarPath path = line(static_cast<int>(state.range(0)));
+  const CartOptions options{.turn = 2.47, .duration = 200.0, .max_acceleration = 1e-3, .at_rest = true};
+  for (auto _ : state) benchmark::DoNotOptimize(cart_law(path, 0.5, 0.75, 0.2, options).energy);
+}
+BENCHMARK(cart_law_limited)->Arg(500)->Arg(5068)->Unit(benchmark::kMillisecond);
+
 // Waves about the cart's line: a part of the region in each half wave.
 void cart_law_waves(benchmark::State& state) {
   constexpr int kSamples = 5068;

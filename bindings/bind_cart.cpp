@@ -64,15 +64,15 @@ void bind_cart(py::module_& m) {
   m.def(
       "cart_law",
       [](const ArrayLike& flange_xy, double start, double end, double radius, double lower, double upper, double margin,
-         std::optional<double> turn, double duration, double max_speed, double max_acceleration) {
+         std::optional<double> turn, double duration, double max_speed, double max_acceleration, bool at_rest) {
         const PlanarPath path = path_argument(flange_xy);
-        const CartOptions options{lower, upper, margin, turn, duration, max_speed, max_acceleration};
+        const CartOptions options{lower, upper, margin, turn, duration, max_speed, max_acceleration, at_rest};
         py::gil_scoped_release release;
         return planning::cart_law(path, start, end, radius, options);
       },
       py::arg("flange_xy"), py::arg("start"), py::arg("end"), py::arg("radius"), py::kw_only(), py::arg("lower"),
       py::arg("upper"), py::arg("margin"), py::arg("turn"), py::arg("duration"), py::arg("max_speed"),
-      py::arg("max_acceleration"), "The cart's law of the least energy. `sigmaik.planning.cart_motion` is what to call.");
+      py::arg("max_acceleration"), py::arg("at_rest"), "The cart's law of the least energy. `sigmaik.planning.cart_motion` is what to call.");
   m.def(
       "forbidden_intervals",
       [](const ArrayLike& flange_xy, double radius) -> Vectors {

@@ -1172,7 +1172,7 @@ def cart_descent(lower: numpy.typing.ArrayLike, upper: numpy.typing.ArrayLike, g
     """
     Gradient descent (10) from a guess (M,) [m]: the law and the number of iterations.
     """
-def cart_law(flange_xy: numpy.typing.ArrayLike, start: typing.SupportsFloat | typing.SupportsIndex, end: typing.SupportsFloat | typing.SupportsIndex, radius: typing.SupportsFloat | typing.SupportsIndex, *, lower: typing.SupportsFloat | typing.SupportsIndex, upper: typing.SupportsFloat | typing.SupportsIndex, margin: typing.SupportsFloat | typing.SupportsIndex, turn: typing.SupportsFloat | typing.SupportsIndex | None, duration: typing.SupportsFloat | typing.SupportsIndex, max_speed: typing.SupportsFloat | typing.SupportsIndex, max_acceleration: typing.SupportsFloat | typing.SupportsIndex) -> CartLaw:
+def cart_law(flange_xy: numpy.typing.ArrayLike, start: typing.SupportsFloat | typing.SupportsIndex, end: typing.SupportsFloat | typing.SupportsIndex, radius: typing.SupportsFloat | typing.SupportsIndex, *, lower: typing.SupportsFloat | typing.SupportsIndex, upper: typing.SupportsFloat | typing.SupportsIndex, margin: typing.SupportsFloat | typing.SupportsIndex, turn: typing.SupportsFloat | typing.SupportsIndex | None, duration: typing.SupportsFloat | typing.SupportsIndex, max_speed: typing.SupportsFloat | typing.SupportsIndex, max_acceleration: typing.SupportsFloat | typing.SupportsIndex, at_rest: bool) -> CartLaw:
     """
     The cart's law of the least energy. `sigmaik.planning.cart_motion` is what to call.
     """

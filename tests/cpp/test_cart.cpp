@@ -313,6 +313,55 @@ TEST_CASE("a larger circle costs more, and any other law is faster") {
   }
 }
 
+TEST_CASE("limits of speed and acceleration are kept, at tips between samples too") {
+  Random random(9);
+  int limited = 0, tips = 0;
+  for (int trial = 0; trial < 400; ++trial) {
+    const int m = random.integer(20, 300);
+    const PlanarPath path = wave(random, m, random.uniform(0.2, 1.5), random.uniform(0.2, 1.0));
+    const double start = random.uniform(-1, 1), end = random.uniform(-1, 1), r = random.uniform(0.02, 0.2);
+    const double duration = m - 1;
+    CartOptions options{.duration = duration};
+    try {
+      const CartLaw free = cart_law(path, start, end, r, options);
+      double top = 0.0;
+      for (Eigen::Index i = 1; i + 1 < m; ++i) top = std::max(top, std::abs(second_difference(free.x, i)));
+      options.max_acceleration = top * random.uniform(0.2, 1.0) + 1e-9;
+      options.max_speed = random.chance(0.5) ? kInfinity : 3.0 * (free.x.tail(m - 1) - free.x.head(m - 1)).cwiseAbs().maxCoeff();
+      options.at_rest = random.chance(0.5);
+      const CartLaw law = cart_law(path, start, end, r, options);
+      ++limited;
+      CHECK(law.x[0] == start);
+      CHECK(law.x[m - 1] == end);
+      for (Eigen::Index i = 0; i + 1 < m; ++i) {
+        CHECK(std::abs(law.x[i + 1] - law.x[i]) <= options.max_speed);
+        CHECK(std::hypot(path(i, 0) - law.x[i], path(i, 1)) >= r * (1.0 - 1e-10));
+        if (i > 0) CHECK(std::abs(second_difference(law.x, i)) <= options.max_acceleration * (1.0 + 1e-9));
+      }
+      if (options.at_rest) {
+        CHECK(std::abs(law.x[1] - law.x[0]) <= options.max_acceleration);
+        CHECK(std::abs(law.x[m - 1] - law.x[m - 2]) <= options.max_acceleration);
+      }
+      CHECK(law.energy >= free.energy * (1.0 - 1e-9));
+      CHECK(law.turn == doctest::Approx(turn_of(path, law.x)).epsilon(1e-9));
+      // P and the cart move on straight lines between samples: at a tip their positions along x tell the side.
+      for (const CartRegion& region : law.regions) {
+        for (const double tip : {region.first, region.last}) {
+          const double at = std::floor(tip), f = tip - at;
+          const auto i = static_cast<Eigen::Index>(at);
+          if (f == 0.0) continue;
+          ++tips;
+          const double seen = (1.0 - f) * (law.x[i] - path(i, 0)) + f * (law.x[i + 1] - path(i + 1, 0));
+          CHECK(region.side * seen >= -1e-10);
+        }
+      }
+    } catch (const CartError&) {
+    }
+  }
+  CHECK(limited > 100);
+  CHECK(tips > 100);
+}
+
 TEST_CASE("tips and whole regions between samples are kept out of") {
   // The law would hook around the end of the region, which lies between two samples.
   int hooks = 0;

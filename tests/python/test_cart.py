@@ -103,20 +103,28 @@ def test_margin_keeps_off(taught):
 # --- against a solver of quadratic programs
 
 
-def quadratic_program(start, end, lower, upper):
-    """min Σ(Δx)² over the samples between two ends."""
-    n = len(lower) - 2
+def quadratic_program(start, end, lower, upper, acceleration=math.inf, at_rest=False):
+    """min Σ(Δx)² over the samples between two ends, in a tube, with bounds on second differences; None if infeasible."""
+    m = len(lower)
+    n = m - 2
     hessian = 2.0 * (2.0 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1))
     linear = np.zeros(n)
     linear[0] += 2.0 * start
     linear[-1] += 2.0 * end
-    rows, bounds = [], []
-    for sign, bound in ((1.0, lower[1:-1]), (-1.0, -upper[1:-1])):
-        some = np.flatnonzero(np.isfinite(bound))
-        rows.append(sign * np.eye(n)[some])
-        bounds.append(bound[some])
-    c, b = np.vstack(rows), np.concatenate(bounds)
-    x = quadprog.solve_qp(hessian, linear, c.T, b)[0] if len(b) else np.linalg.solve(hessian, linear)
+    step = np.diff(np.eye(m), axis=0)
+    rows = [np.eye(m)[1:-1], np.diff(step, axis=0)] + ([step[[0, -1]]] if at_rest else [])
+    low = np.concatenate([lower[1:-1], np.full(n + 2 * at_rest, -acceleration)])
+    high = np.concatenate([upper[1:-1], np.full(n + 2 * at_rest, acceleration)])
+    c = np.vstack(rows)
+    c, b = np.vstack([c, -c]), np.concatenate([low, -high])
+    b -= c[:, 0] * start + c[:, -1] * end
+    some = np.isfinite(b)
+    if not np.any(some):
+        return np.concatenate([[start], np.linalg.solve(hessian, linear), [end]])
+    try:
+        x = quadprog.solve_qp(hessian, linear, c[some, 1:-1].T, b[some])[0]
+    except ValueError:
+        return None
     return np.concatenate([[start], x, [end]])
 
 
@@ -140,6 +148,51 @@ def test_agrees_with_a_qp_solver_on_both_sides_of_several_regions():
         both += len(m.regions) > 1 and {r.side for r in m.regions} == {1, -1}
     assert compared > 300
     assert both > 50
+
+
+def test_limited_acceleration_agrees_with_a_qp_solver():
+    rng = np.random.default_rng(5)
+    done = refused = 0
+    for _ in range(300):
+        m = int(rng.integers(20, 90))
+        path, (start, end) = wave(rng, m, rng.uniform(0.3, 1.5)), rng.uniform(-1, 1, 2)
+        keep = {"radius": rng.uniform(0.02, 0.3), "duration": m - 1.0}
+        try:
+            free = cart_motion(path, start, end, **keep)
+        except CartError:
+            continue
+        if np.any(free.corners % 1.0):
+            continue
+        most, at_rest = free.max_acceleration * rng.uniform(0.2, 1.5) + 1e-9, bool(rng.random() < 0.5)
+        low = np.where(free.sides > 0, free.upper, -math.inf)
+        high = np.where(free.sides < 0, free.lower, math.inf)
+        expected = quadratic_program(start, end, low, high, most, at_rest)
+        if expected is None:
+            with pytest.raises(CartError, match="acceleration"):
+                cart_motion(path, start, end, **keep, max_acceleration=most, at_rest=at_rest)
+            refused += 1
+            continue
+        limited = cart_motion(path, start, end, **keep, max_acceleration=most, at_rest=at_rest)
+        assert np.abs(limited.x - expected).max() < 1e-6
+        assert limited.admissible
+        assert limited.max_acceleration <= most * (1.0 + 1e-9)
+        assert limited.energy >= free.energy * (1.0 - 1e-9)
+        done += 1
+    assert done > 100
+    assert refused > 50
+
+
+def test_from_rest_to_rest(taught):
+    m = exact(taught, max_acceleration=1e-3, at_rest=True, max_speed=2.6e-3)
+    assert m.admissible
+    assert m.max_acceleration <= 1e-3 * (1 + 1e-6)
+    assert np.abs(np.diff(m.x)[[0, -1]]).max() <= 1e-3 * (200 / 5067) ** 2 * (1 + 1e-9)
+    assert m.max_speed <= 2.6e-3
+    assert 1.0 < m.energy / exact(taught).energy < 1.01
+    with pytest.raises(CartError, match="duration of") as refusal:
+        exact(taught, max_acceleration=2e-5, at_rest=True)
+    longer = float(str(refusal.value).split("a duration of ")[1].split()[0])
+    assert exact(taught, max_acceleration=2e-5, at_rest=True, duration=longer).admissible
 
 
 def test_least_top_speed():

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "../message.hpp"
+#include "band_qp.hpp"
 
 namespace sigmaik::planning {
 namespace {
@@ -431,12 +432,52 @@ double top_speed(const CartLaw& law, double dt) {
   return top / dt;
 }
 
-double top_acceleration(const CartLaw& law, double dt) {
-  double top = 0.0;
-  for (Eigen::Index i = 1; i + 1 < law.x.size(); ++i) {
-    top = std::max(top, std::abs(law.x[i + 1] - 2.0 * law.x[i] + law.x[i - 1]));
-  }
+// Between samples; from and to rest too, where asked for.
+double top_acceleration(const VectorXd& x, double dt, bool at_rest) {
+  const Eigen::Index m = x.size();
+  double top = at_rest ? std::max(std::abs(x[1] - x[0]), std::abs(x[m - 1] - x[m - 2])) : 0.0;
+  for (Eigen::Index i = 1; i + 1 < m; ++i) top = std::max(top, std::abs(x[i + 1] - 2.0 * x[i] + x[i - 1]));
   return top / (dt * dt);
+}
+
+// The law of the least energy on the sides of `law`, within speed and acceleration [m per sample, m per sample²]. False where
+// there is none.
+bool accelerate(const PlanarPath& path, double r, const CartOptions& options, double speed, double acceleration, CartLaw& law) {
+  const Grid grid = make_grid(path, r);
+  const int m = static_cast<int>(law.x.size());
+  if (m < 3) return false;
+  std::vector<BandRow> rows;
+  std::size_t j = 0;
+  for (std::size_t k = 0; k < grid.at.size(); ++k) {
+    while (j < grid.extents.size() && grid.extents[j].last < static_cast<int>(k)) ++j;
+    double lower = options.lower, upper = options.upper;
+    if (j < grid.extents.size() && grid.extents[j].first <= static_cast<int>(k)) {
+      if (law.regions[j].side > 0) lower = std::max(lower, grid.points[k].upper);
+      if (law.regions[j].side < 0) upper = std::min(upper, grid.points[k].lower);
+    }
+    const double at = std::floor(grid.at[k]), f = grid.at[k] - at;
+    const int i = static_cast<int>(at);
+    if (f > 0.0) {
+      rows.push_back({i, 2, {1.0 - f, f, 0.0}, lower, upper});
+    } else if (i > 0 && i + 1 < m) {
+      rows.push_back({i, 1, {1.0, 0.0, 0.0}, lower, upper});
+    }
+  }
+  for (int i = 0; i + 2 < m; ++i) rows.push_back({i, 3, {1.0, -2.0, 1.0}, -acceleration, acceleration});
+  for (int i = 0; i + 1 < m; ++i) {
+    double most = speed;
+    if (options.at_rest && (i == 0 || i + 2 == m)) most = std::min(most, acceleration);
+    if (most < kInfinity) rows.push_back({i, 2, {-1.0, 1.0, 0.0}, -most, most});
+  }
+  std::vector<double> x(law.x.data(), law.x.data() + m);
+  if (!BandQp(std::move(rows)).solve(x)) return false;
+  law.x = Eigen::Map<const VectorXd>(x.data(), m);
+  law.energy = (law.x.tail(m - 1) - law.x.head(m - 1)).squaredNorm();
+  law.multipliers.segment(1, m - 2) = 2.0 * law.x.segment(1, m - 2) - law.x.head(m - 2) - law.x.tail(m - 2);
+  law.corners.resize(x.size());
+  for (std::size_t i = 0; i < x.size(); ++i) law.corners[i] = static_cast<double>(i);
+  law.corner_x = std::move(x);
+  return true;
 }
 
 Outcome solve(const PlanarPath& path, double start, double end, double r, const CartOptions& options) {
@@ -554,12 +595,28 @@ CartLaw cart_law(const PlanarPath& path, double start, double end, double radius
   const double r = radius + options.margin, dt = options.duration / static_cast<double>(path.rows() - 1);
   Outcome out = solve(path, start, end, r, options);
   if (!out.fault) {
-    const double acceleration = top_acceleration(out.law, dt);
-    if (acceleration <= options.max_acceleration) return std::move(out.law);
+    if (top_acceleration(out.law.x, dt, options.at_rest) <= options.max_acceleration) return std::move(out.law);
+    // A longer duration only makes limits, counted in samples, wider.
+    const auto within = [&](double longer) {
+      constexpr double kInside = 1.0 - 1e-9;
+      const double step = longer * dt;
+      return accelerate(path, r, options, kInside * options.max_speed * step, kInside * options.max_acceleration * step * step,
+                        out.law);
+    };
+    if (within(1.0)) return std::move(out.law);
+    double good = 2.0, bad = 1.0;
+    while (good < 1e6 && !within(good)) {
+      bad = good;
+      good *= 2.0;
+    }
+    for (int i = 0; i < 5; ++i) {
+      const double middle = 0.5 * (good + bad);
+      (within(middle) ? good : bad) = middle;
+    }
     throw CartError(CartFault::Acceleration, kNaN,
-                    message("no cart motion (acceleration): the shortest way accelerates by ", acceleration,
-                            " m/s², the cart by ", options.max_acceleration, " m/s²; a duration of ",
-                            options.duration * std::sqrt(acceleration / options.max_acceleration), " s would do"));
+                    message("no cart motion (acceleration): on the sides of the shortest way none keeps to ", options.max_acceleration,
+                            " m/s²", options.at_rest ? " from rest to rest" : "", "; a duration of ", good * options.duration,
+                            " s would do"));
   }
   if (*out.fault == CartFault::Winding) explain(path, start, end, r, options, out);
   const double feasible = *out.fault == CartFault::Undecided ? kNaN : feasible_radius(path, start, end, radius, options);

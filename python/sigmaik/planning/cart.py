@@ -50,7 +50,7 @@ class CartMotion:
     """(K,) [m] there."""
     multipliers: Array | None = field(repr=False)
     """(M,) [m] μ_i = 2x_i − x_{i−1} − x_{i+1} of the exact law: > 0 only where it is held up by λ+ or the cart's range, < 0
-    only where it is held down, 0 elsewhere; else None."""
+    only where it is held down, 0 elsewhere (not where the acceleration is limited); else None."""
     radius: float
     """[m] of the forbidden cylinder, without the margin."""
     margin: float
@@ -116,6 +116,7 @@ def cart_motion(
     duration: float = 1.0,
     max_speed: float = math.inf,
     max_acceleration: float = math.inf,
+    at_rest: bool = False,
     first_guess: Guess | ArrayLike = "linear",
     step: float | None = None,
     max_iterations: int = PUBLISHED_ITERATIONS,
@@ -156,8 +157,11 @@ def cart_motion(
     duration
         [s] from the first to the last sample. The limits count in it.
     max_speed, max_acceleration
-        [m/s], [m/s²] of the cart. A law within the speed limit is found if there is one. The acceleration is that of the
-        law of the least energy, whose corners are not rounded: where it is too high, the law is refused.
+        [m/s], [m/s²] of the cart, second differences over the samples. A law within the speed limit is found if there is one.
+        Where the law of the least energy accelerates too much, the one of the least energy that does not takes its place, on
+        the same sides, by an interior-point method; other sides are not tried.
+    at_rest
+        Start and stop within max_acceleration, where that is finite.
     first_guess
         Of the gradient descent: "linear" from start to end; "admissible", a jump past the region and back at the end, to
         the cart's range where it is finite; or (M,) [m]. From an inadmissible guess the descent stops at the first
@@ -193,6 +197,7 @@ def cart_motion(
             duration=duration,
             max_speed=max_speed,
             max_acceleration=max_acceleration,
+            at_rest=at_rest,
         )
 
     if method == "exact":
