@@ -1,0 +1,37 @@
+"""The arm round a table."""
+
+import numpy as np
+import pytest
+from sigmaik.experiments import around_table as at
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_free_of_collisions_and_further_from_singularities_with_the_index(seed):
+    scene = at.load_scene(seed)
+    with_index, without = (at.plan(scene, index, seed) for index in (True, False))
+    assert with_index.status != "failed"
+    assert without.status != "failed"
+    a, b = at.along(scene, with_index), at.along(scene, without)
+    assert a.distance.min() > -1e-3
+    assert b.distance.min() > -1e-3
+    assert a.m.mean() >= b.m.mean()
+    assert a.lambda_1.mean() >= b.lambda_1.mean()
+    assert a.kappa.mean() <= b.kappa.mean()
+    assert a.q[0] == pytest.approx(scene.start)
+    assert a.q[-1] == pytest.approx(scene.goal, abs=1e-12)
+
+
+def test_command(tmp_path, capsys):
+    from sigmaik.cli import main
+
+    assert main(["table", "--out", str(tmp_path)]) == 0
+    out = capsys.readouterr().out
+    assert out.splitlines()[-1] == str(tmp_path / "table.png")
+    assert (tmp_path / "table.png").stat().st_size > 20_000
+    assert main(["table", "--seed", "-1"]) == 2
+
+
+def test_scene_is_seeded():
+    one, two = at.load_scene(3), at.load_scene(3)
+    assert np.array_equal(one.start, two.start)
+    assert np.array_equal(one.goal, two.goal)
