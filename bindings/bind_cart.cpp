@@ -51,8 +51,10 @@ void bind_cart(py::module_& m) {
 
   py::class_<CartLaw>(m, "CartLaw", "Answer of cart_law().")
       .def_property_readonly("x", [](const CartLaw& c) { return to_numpy(c.x); }, "(M,) [m]")
-      .def_property_readonly("lower", [](const CartLaw& c) { return to_numpy(c.lower); }, "(M,) [m] λ−, ∞ where nothing is forbidden.")
-      .def_property_readonly("upper", [](const CartLaw& c) { return to_numpy(c.upper); }, "(M,) [m] λ+, −∞ where nothing is forbidden.")
+      .def_property_readonly("lower", [](const CartLaw& c) { return to_numpy(c.lower); },
+                             "(M,) [m] λ−, ∞ where nothing is forbidden.")
+      .def_property_readonly("upper", [](const CartLaw& c) { return to_numpy(c.upper); },
+                             "(M,) [m] λ+, −∞ where nothing is forbidden.")
       .def_property_readonly("multipliers", [](const CartLaw& c) { return to_numpy(c.multipliers); }, "(M,) [m] μ.")
       .def_readonly("regions", &CartLaw::regions, "Connected parts of the forbidden region.")
       .def_readonly("corners", &CartLaw::corners, "[samples] where the string bends, and its ends.")
@@ -83,7 +85,8 @@ void bind_cart(py::module_& m) {
       py::arg("flange_xy"), py::arg("radius"), "λ−, λ+ (M,) [m]; ∞ and −∞ where nothing is forbidden.");
   m.def(
       "taut_string",
-      [](const ArrayLike& at, const ArrayLike& lower, const ArrayLike& upper) -> py::typing::Tuple<py::array_t<double>, py::typing::List<py::int_>> {
+      [](const ArrayLike& at, const ArrayLike& lower,
+         const ArrayLike& upper) -> py::typing::Tuple<py::array_t<double>, py::typing::List<py::int_>> {
         Eigen::VectorXd x;
         std::vector<int> corners;
         planning::taut_string(bounds_argument(at, "at"), bounds_argument(lower, "lower"), bounds_argument(upper, "upper"), x,
@@ -101,7 +104,11 @@ void bind_cart(py::module_& m) {
         int iterations = 0;
         {
           py::gil_scoped_release release;
-          iterations = planning::cart_descent(low, high, x, {.alpha = alpha, .step = step, .max_iterations = max_iterations, .until_admissible = until_admissible});
+          iterations = planning::cart_descent(low, high, x,
+                                              {.alpha = alpha,
+                                               .step = step,
+                                               .max_iterations = max_iterations,
+                                               .until_admissible = until_admissible});
         }
         return py::make_tuple(to_numpy(x), iterations);
       },

@@ -90,7 +90,8 @@ def joints_figure(e: CartExperiment, runs: Sequence[CartRun]) -> Figure:
         panel.set_xlim(0.0, e.duration)
         panel.grid(alpha=0.3)
     panels[0].set_ylim(-2.6, 2.6)
-    panels[0].legend(ncol=2, fontsize=8)
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncol=7, fontsize=8, frameon=False)
     return figure
 
 

@@ -34,8 +34,8 @@ PlanarPath line(double x0, double y0, double x1, double y1, int samples) {
 // A smooth path that goes to and fro over the cart's line.
 PlanarPath wave(Random& random, int samples, double waves, double size) {
   PlanarPath path(samples, 2);
-  const double a = random.uniform(0, 6), b = random.uniform(0, 6), f = random.uniform(0.5, 1.5) * waves, g = random.uniform(0, 1) * waves;
-  const double drift = random.uniform(-1, 1);
+  const double a = random.uniform(0, 6), b = random.uniform(0, 6), drift = random.uniform(-1, 1);
+  const double f = random.uniform(0.5, 1.5) * waves, g = random.uniform(0, 1) * waves;
   for (int i = 0; i < samples; ++i) {
     const double s = static_cast<double>(i) / (samples - 1);
     path.row(i) << size * (0.4 * std::sin(6.28 * g * s + b) + drift * s), size * std::cos(6.28 * f * s + a);
@@ -371,8 +371,10 @@ TEST_CASE("tips and whole regions between samples are kept out of") {
     const CartLaw law = cart_law(path, 0.3, -0.6, 0.2);
     REQUIRE(law.regions.size() == 1);
     const double tip = law.regions[0].last;
-    const auto after = static_cast<std::size_t>(std::find_if(law.corners.begin(), law.corners.end(), [&](double at) { return at >= tip; }) - law.corners.begin());
-    const double t0 = law.corners[after - 1], t1 = law.corners[after], x0 = law.corner_x[after - 1], x1 = law.corner_x[after];
+    std::size_t after = 0;
+    while (law.corners[after] < tip) ++after;
+    const double t0 = law.corners[after - 1], t1 = law.corners[after];
+    const double x0 = law.corner_x[after - 1], x1 = law.corner_x[after];
     CHECK(x0 + (x1 - x0) * (tip - t0) / (t1 - t0) >= -1e-12);  // at the tip above P's x, 0
     hooks += t1 == tip;
   }
@@ -427,6 +429,11 @@ TEST_CASE("what cannot be done is told apart") {
   CHECK(radius > 0.08);
   std::tie(why, radius) = fault(through, 0.0, 0.0, 0.2, {.duration = 1.0, .max_acceleration = 0.2});
   CHECK(why == CartFault::Acceleration);
+  std::tie(why, radius) = fault(line(0.0, 0.5, 0.0, 0.5, 2), 0.0, 1.0, 0.2, {.max_acceleration = 0.2, .at_rest = true});
+  CHECK(why == CartFault::Acceleration);
+  // A part of the region that begins at a tip between the last two samples: which side it is on is told by the end.
+  CHECK(cart_law(line(0.0, 0.5, 0.0, 0.15, 8), -0.9, 0.16, 0.2).regions[0].side == 1);
+  CHECK(cart_law(line(0.0, 0.5, 0.0, 0.15, 8), 0.9, -0.16, 0.2).regions[0].side == -1);
 
   Random random(8);
   const PlanarPath many = wave(random, 2000, 30.0, 1.0);

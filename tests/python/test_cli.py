@@ -41,7 +41,7 @@ def test_version(capsys):
     assert capsys.readouterr().out == f"sigmaik {sk.__version__}\n"
 
 
-@pytest.mark.parametrize("arguments", [[], ["reach", "--help"], ["limits", "--help"], ["info", "--help"]])
+@pytest.mark.parametrize("arguments", [[], ["reach", "--help"], ["limits", "--help"], ["cart", "--help"], ["info", "--help"]])
 def test_help(capsys, arguments):
     with pytest.raises(SystemExit) as exit_:
         main(arguments)

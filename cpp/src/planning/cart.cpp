@@ -18,6 +18,7 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kPi = 3.14159265358979323846;
 constexpr double kNear = 1e-6;  // [samples] a tip keeps away from the samples beside it
+constexpr double kLongest = 1e6;  // times the duration, where limits of acceleration are too tight
 constexpr int kLeap = 16;       // points inside a region that lies between two samples
 
 struct GridPoint {
@@ -265,7 +266,8 @@ class Search {
     high_.assign(n, options_.upper);
     x_.resize(n);
     for (std::size_t j = 0; j < sides.size(); ++j) {
-      const auto first = static_cast<std::size_t>(grid_.extents[j].first), last = static_cast<std::size_t>(grid_.extents[j].last);
+      const auto first = static_cast<std::size_t>(grid_.extents[j].first);
+      const auto last = static_cast<std::size_t>(grid_.extents[j].last);
       if (sides[j] > 0) {
         for (std::size_t k = first; k <= last; ++k) low_[k] = std::max(low_[k], grid_.points[k].upper);
       } else if (sides[j] < 0) {
@@ -308,8 +310,9 @@ class Search {
   // Side of a part of the region that the string passes.
   int passes(std::size_t j) const {
     const Extent& e = grid_.extents[j];
-    const auto middle = static_cast<std::size_t>(e.first + (e.last - e.first) / 2);
-    return x_[middle] > grid_.points[middle].px ? 1 : -1;
+    auto k = static_cast<std::size_t>(e.first + (e.last - e.first) / 2);
+    if (grid_.points[k].lower == grid_.points[k].upper) k = static_cast<std::size_t>(e.last);  // a tip tells no side
+    return x_[k] > grid_.points[k].px ? 1 : -1;
   }
 
   // Whether the sides still open leave room for the turn asked for. P's azimuth goes over the half-line of π where the cart
@@ -496,13 +499,17 @@ void explain(const PlanarPath& path, double start, double end, double r, const C
                         " m/s, or a duration of ", options.duration * speed / options.max_speed, " s");
     return;
   }
+  if (*without.fault == CartFault::Undecided) {
+    out = std::move(without);
+    return;
+  }
   o = options;
   o.lower = -kInfinity;
   o.upper = kInfinity;
   without = solve(path, start, end, r, o);
   if (!without.fault) {
     out.fault = CartFault::Range;
-    out.facts = message("a turn of ", *options.turn, " rad needs the cart from ", without.law.x.minCoeff(), " to ",
+    out.facts = message("a turn of ", options.turn.value_or(kNaN), " rad needs the cart from ", without.law.x.minCoeff(), " to ",
                         without.law.x.maxCoeff(), " m, out of its range [", options.lower, ", ", options.upper, "] m");
     return;
   }
@@ -605,18 +612,18 @@ CartLaw cart_law(const PlanarPath& path, double start, double end, double radius
     };
     if (within(1.0)) return std::move(out.law);
     double good = 2.0, bad = 1.0;
-    while (good < 1e6 && !within(good)) {
+    while (good < kLongest && !within(good)) {
       bad = good;
       good *= 2.0;
     }
-    for (int i = 0; i < 5; ++i) {
+    for (int i = 0; i < 5 && good < kLongest; ++i) {
       const double middle = 0.5 * (good + bad);
       (within(middle) ? good : bad) = middle;
     }
     throw CartError(CartFault::Acceleration, kNaN,
                     message("no cart motion (acceleration): on the sides of the shortest way none keeps to ", options.max_acceleration,
-                            " m/s²", options.at_rest ? " from rest to rest" : "", "; a duration of ", good * options.duration,
-                            " s would do"));
+                            " m/s²", options.at_rest ? " from rest to rest" : "",
+                            good < kLongest ? message("; a duration of ", good * options.duration, " s would do") : ""));
   }
   if (*out.fault == CartFault::Winding) explain(path, start, end, r, options, out);
   const double feasible = *out.fault == CartFault::Undecided ? kNaN : feasible_radius(path, start, end, radius, options);

@@ -166,7 +166,7 @@ def run(e: CartExperiment, method: str, iterations: int = PUBLISHED_ITERATIONS) 
 
 
 def redundancy(e: CartExperiment, gain: float = 1.0, damping: float = 0.02, feedback: float = 1.0) -> Array:
-    """q (M, 7) of q̇ = J†(ṗ + feedback · error) + gain (I − J†J) ∂w/∂q, w = −½ Σ ((q_k − mid_k)/range_k)² (11), (12).
+    """q (M, 7) of (11), (12): q̇ = J†(ṗ + feedback · error) + gain (I − J†J) ∂w/∂q, w = −½ Σ ((q_k − mid_k)/range_k)².
 
     J† is damped by `damping`: without, the arm runs into a singularity and the scheme stops there. The paper gives no
     gain; feedback [1/s] of position keeps drift away.
