@@ -31,6 +31,9 @@ class PotentialCost final : public JointCost {
   double model(const JointRef& q, JointVector& gradient, JointMatrix& hessian) const noexcept override {
     return sets_.potential(q, potential_, gradient, hessian);
   }
+  double gradient(const JointRef& q, JointVector& gradient) const noexcept override {
+    return sets_.potential(q, potential_, gradient);
+  }
 
  private:
   SingularSets sets_;
@@ -54,6 +57,11 @@ class InverseCost : public JointCost {
     gradient *= slope;
     return weight_ * inverse;
   }
+  double invert(double m, JointVector& gradient) const noexcept {
+    const double inverse = 1.0 / (m + epsilon_);
+    gradient *= -weight_ * inverse * inverse;
+    return weight_ * inverse;
+  }
 
  private:
   double weight_, epsilon_;
@@ -67,6 +75,10 @@ class ClosedFormCost final : public InverseCost {
   double model(const JointRef& q, JointVector& gradient, JointMatrix& hessian) const noexcept override {
     const double m = sets_.manipulability(q, gradient, hessian);
     return invert(m, gradient, hessian);
+  }
+  double gradient(const JointRef& q, JointVector& gradient) const noexcept override {
+    const double m = sets_.manipulability(q, gradient);
+    return invert(m, gradient);
   }
 
  private:
@@ -99,6 +111,10 @@ class GenericCost final : public InverseCost {
     }
     hessian = (0.5 * (hessian + hessian.transpose())).eval();
     return invert(m, gradient, hessian);
+  }
+  double gradient(const JointRef& q, JointVector& gradient) const noexcept override {
+    const double m = index_.value(chain_, q, gradient);
+    return invert(m, gradient);
   }
 
  private:
