@@ -567,10 +567,10 @@ void add_shapes(const XMLElement& link, const std::string& name, int segment, co
       require(shape.size.minCoeff() > 0.0, owner, ": <box size=\"", shape.size.transpose(), "\">: it must be above 0");
     } else if (what == "cylinder") {
       shape.kind = Kind::Cylinder;
-      shape.size << positive(owner, *g, "radius"), positive(owner, *g, "length"), 0.0;
+      shape.size = Eigen::Vector3d(positive(owner, *g, "radius"), positive(owner, *g, "length"), 0.0);
     } else if (what == "sphere") {
       shape.kind = Kind::Sphere;
-      shape.size << positive(owner, *g, "radius"), 0.0, 0.0;
+      shape.size = Eigen::Vector3d(positive(owner, *g, "radius"), 0.0, 0.0);
     } else {
       mesh = true;
       continue;

@@ -544,6 +544,7 @@ TEST_CASE("what is refused") {
   }
 }
 
+#ifdef SIGMAIK_TEST_HEAP
 TEST_CASE("no heap") {
   const Chain& arm = test::arms().at("franka_panda");
   const ArmSpheres spheres = ArmSpheres::along_links(arm);
@@ -560,3 +561,4 @@ TEST_CASE("no heap") {
   CHECK(heap.calls() == 0);
   CHECK(sum > 0.0);
 }
+#endif

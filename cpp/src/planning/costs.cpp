@@ -33,6 +33,9 @@ class PotentialCost final : public JointCost {
   double model(const JointRef& q, JointVector& gradient, JointMatrix& hessian) const noexcept override {
     return sets_.potential(q, potential_, gradient, hessian);
   }
+  double gradient(const JointRef& q, JointVector& gradient) const noexcept override {
+    return sets_.potential(q, potential_, gradient);
+  }
 
  private:
   SingularSets sets_;
@@ -56,6 +59,11 @@ class InverseCost : public JointCost {
     gradient *= slope;
     return weight_ * inverse;
   }
+  double invert(double m, JointVector& gradient) const noexcept {
+    const double inverse = 1.0 / (m + epsilon_);
+    gradient *= -weight_ * inverse * inverse;
+    return weight_ * inverse;
+  }
 
  private:
   double weight_, epsilon_;
@@ -69,6 +77,10 @@ class ClosedFormCost final : public InverseCost {
   double model(const JointRef& q, JointVector& gradient, JointMatrix& hessian) const noexcept override {
     const double m = sets_.manipulability(q, gradient, hessian);
     return invert(m, gradient, hessian);
+  }
+  double gradient(const JointRef& q, JointVector& gradient) const noexcept override {
+    const double m = sets_.manipulability(q, gradient);
+    return invert(m, gradient);
   }
 
  private:
@@ -107,6 +119,10 @@ class GenericCost final : public InverseCost {
     const double m = index_.value(chain_, q, gradient);
     difference_hessian(q, hessian, [this](const JointVector& x, JointVector& g) { index_.value(chain_, x, g); });
     return invert(m, gradient, hessian);
+  }
+  double gradient(const JointRef& q, JointVector& gradient) const noexcept override {
+    const double m = index_.value(chain_, q, gradient);
+    return invert(m, gradient);
   }
 
  private:

@@ -199,6 +199,8 @@ class Obstacles:
         inside = np.asarray(occupied)
         if inside.ndim != 3:
             raise Error(f"occupied has shape {inside.shape}, needs (X, Y, Z)")
+        if not np.isin(inside, (0, 1)).all():
+            raise Error("occupied must hold truth values, or 0 and 1; of probabilities say first which count")
         inside = inside.astype(bool)
         if inside.all() or not inside.any():
             raise Error(f"{'every' if inside.any() else 'no'} cell is occupied: there is no surface to be distant from")
