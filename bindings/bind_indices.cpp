@@ -77,16 +77,17 @@ void bind_indices(py::module_& m) {
   m.def(
       "evaluate_index",
       [](const Chain& chain, const ArrayLike& q, const std::string& index, const ArrayLike& k, double length_scale,
-         int threads) -> py::typing::Tuple<py::array_t<double>, py::array_t<double>> {
+         int threads, bool gradients) -> py::typing::Tuple<py::array_t<double>, py::array_t<double>> {
         const IndexFunction function = function_argument(index, k, length_scale);
         if (function.rows() != 0 && function.rows() != 6) throw Error("Σ must be (6, 6) for a chain");
         const int n = chain.dof();
         const Batch batch = batch_argument(q, n);
         const py::ssize_t count = batch.count();
         py::array_t<double> value(batch.many ? std::vector<py::ssize_t>{count} : std::vector<py::ssize_t>{});
-        py::array_t<double> gradient(batch.many ? std::vector<py::ssize_t>{count, n} : std::vector<py::ssize_t>{n});
+        const py::ssize_t columns = gradients ? n : 0;
+        py::array_t<double> gradient(batch.many ? std::vector<py::ssize_t>{count, columns} : std::vector<py::ssize_t>{columns});
         double* to = value.mutable_data();
-        double* slope = gradient.mutable_data();
+        double* slope = gradients ? gradient.mutable_data() : nullptr;
         {
           py::gil_scoped_release release;
           evaluate(chain, function, static_cast<std::size_t>(count), batch.q.data(), to, slope, threads);
@@ -94,7 +95,8 @@ void bind_indices(py::module_& m) {
         return py::make_tuple(value, gradient);
       },
       py::arg("chain"), py::arg("q"), py::arg("index"), py::arg("k") = kDefaultScale, py::arg("length_scale") = 1.0,
-      py::arg("threads") = 1, "Values () or (B,) and gradients (n,) or (B, n) at q (n,) or (B, n).");
+      py::arg("threads") = 1, py::arg("gradients") = true,
+      "Values () or (B,) and, where asked for, gradients (n,) or (B, n) at q (n,) or (B, n).");
   m.def("reference_scale", &reference_scale, py::arg("chain"), py::arg("length_scale") = 1.0,
         "k of a chain: 6 where the largest eigenvalue of JJᵀ over its joint ranges stays below that by a tenth, else 1.1\n"
         "times that eigenvalue, so that the sphere kI holds every ellipsoid. The same on every machine; takes a few ms.");

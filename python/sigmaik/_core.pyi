@@ -1180,9 +1180,9 @@ def collision_cost(spheres: ArmSpheres, field: DistanceField, clearance: typing.
     """
     weight · Σ c(d) over the spheres that move, d the signed distance of their surfaces to the obstacles.
     """
-def evaluate_index(chain: Chain, q: numpy.typing.ArrayLike, index: str, k: numpy.typing.ArrayLike = 6.0, length_scale: typing.SupportsFloat | typing.SupportsIndex = 1.0, threads: typing.SupportsInt | typing.SupportsIndex = 1) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
+def evaluate_index(chain: Chain, q: numpy.typing.ArrayLike, index: str, k: numpy.typing.ArrayLike = 6.0, length_scale: typing.SupportsFloat | typing.SupportsIndex = 1.0, threads: typing.SupportsInt | typing.SupportsIndex = 1, gradients: bool = True) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
     """
-    Values () or (B,) and gradients (n,) or (B, n) at q (n,) or (B, n).
+    Values () or (B,) and, where asked for, gradients (n,) or (B, n) at q (n,) or (B, n).
     """
 def forbidden_intervals(flange_xy: numpy.typing.ArrayLike, radius: typing.SupportsFloat | typing.SupportsIndex) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
     """

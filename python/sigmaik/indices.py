@@ -81,7 +81,7 @@ def evaluate(
 
     k: as for `geometry_aware`; by default `reference_scale(chain)`. The answers do not depend on their order or `threads`.
     """
-    value = _evaluate(chain, q, index, k, length_scale, threads)[0]
+    value = _evaluate(chain, q, index, k, length_scale, threads, gradients=False)[0]
     return float(value) if value.ndim == 0 else value
 
 
@@ -98,12 +98,12 @@ def gradient(
     Always finite. Where the smallest singular value is zero, or repeated, its slope is that along the singular vectors that
     the decomposition picked, one of several. Where an index is inf its gradient is zero: nothing points out of there.
     """
-    return _evaluate(chain, q, index, k, length_scale, threads)[1]
+    return _evaluate(chain, q, index, k, length_scale, threads, gradients=True)[1]
 
 
 def _evaluate(
-    chain: Chain, q: ArrayLike, index: Index, k: ArrayLike | None, length_scale: float, threads: int
+    chain: Chain, q: ArrayLike, index: Index, k: ArrayLike | None, length_scale: float, threads: int, gradients: bool
 ) -> tuple[Array, Array]:
     if k is None:
         k = reference_scale(chain, length_scale) if index == "geometry_aware" else DEFAULT_SCALE
-    return _core.evaluate_index(chain, q, index, k, length_scale, threads)
+    return _core.evaluate_index(chain, q, index, k, length_scale, threads, gradients)

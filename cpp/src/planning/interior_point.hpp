@@ -6,7 +6,6 @@
 // with every step, and the merit function pays for it.
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 
