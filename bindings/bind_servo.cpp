@@ -36,6 +36,8 @@ void bind_servo(py::module_& m) {
       .def_readonly("status", &ServoStep::status, "What the cycle did, see Status.")
       .def_property_readonly("pose_error", [](const ServoStep& s) { return to_numpy(s.pose_error); },
                              "(6,) [m, rad] target minus tip before the step, unshortened; zero for twist commands")
+      .def_property_readonly("asked_twist", [](const ServoStep& s) { return to_numpy(s.asked_twist); },
+                             "(6,) what the rule was given: the twist command, or the pose error's [m/s, rad/s]")
       .def_property_readonly("achieved_twist", [](const ServoStep& s) { return to_numpy(s.achieved_twist); },
                              "(6,) J q̇ [m/s, rad/s]")
       .def_readonly("scale", &ServoStep::scale, "In [0, 1], what limits left: of the rule's speed ('scale'), or of its twist along itself ('redistribute').")
@@ -147,6 +149,10 @@ void bind_servo(py::module_& m) {
             return checked(s.update_twist(twist_argument(twist, "twist")));
           },
           py::arg("twist"), "One cycle along a twist (6,) [v; ω], base axes, at the tip's origin.")
+      .def("hold", &Servo::hold, "One cycle of the fastest stop that the limits allow, or of rest: HOLDING.")
+      .def("continue_from", &Servo::continue_from, py::arg("other"),
+           "Takes over from another servo of the same arm and dt, in the midst of its motion.\n\n"
+           "Rule and options are this one's; what it commands is faded in from the other's last velocity over soft_start.")
       .def_property("method", &Servo::method, &Servo::set_method, "The rule; may be changed between cycles.")
       .def_property_readonly("chain", &Servo::chain)
       .def_property_readonly("dt", [](const Servo& s) { return s.options().dt; }, "[s]")

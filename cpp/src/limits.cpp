@@ -273,13 +273,31 @@ void LimitTracker::reset(const JointRef& q, const JointRef& qdot) {
   require(q.allFinite(), "q has an entry that is not finite");
   require(qdot.size() == 0 || qdot.size() == n_, "qdot has ", qdot.size(), " entries, the limits ", n_, " joints");
   require(qdot.allFinite(), "qdot has an entry that is not finite");
+  clear();
+  q_ = q;
+  if (qdot.size() != 0) v_ = qdot;
+  for (Joint& joint : joints_) joint.change = joint.slope = 0.0;
+  update();
+}
+
+void LimitTracker::clear() noexcept {
   for (JointVector* x : {&q_, &v_, &stop_, &bounds_.lower, &bounds_.upper}) {
     x->setZero(kMaxJoints);  // beyond n_, too: blocks of a fixed size are read and written
     x->resize(n_);
   }
-  q_ = q;
-  if (qdot.size() != 0) v_ = qdot;
-  for (Joint& joint : joints_) joint.change = joint.slope = 0.0;
+}
+
+void LimitTracker::continue_from(const LimitTracker& other) {
+  require(other.n_ == n_, "the other tracker has ", other.n_, " joints, this one ", n_);
+  require(other.options_.dt == options_.dt, "the other tracker has dt = ", other.options_.dt, " s, this one ", options_.dt);
+  if (other.q_.size() == 0) return;
+  clear();
+  q_ = other.q_;
+  v_ = other.v_;
+  for (std::size_t i = 0; i < joints_.size(); ++i) {
+    joints_[i].change = other.joints_[i].change;
+    joints_[i].slope = other.joints_[i].slope;
+  }
   update();
 }
 

@@ -145,17 +145,28 @@ void Servo::reset(const JointRef& q, const JointRef& qdot) {
   if (qdot.size() != 0) check_joints("qdot", qdot, chain_);
   tracker_.reset(q, qdot);
   qdot_start_ = qdot.size() != 0 ? JointVector(qdot) : JointVector(JointVector::Zero(chain_.dof()));
-  nominal_ = options_.posture.size() != 0 ? options_.posture : JointVector(q);
+  begin(q);
+}
+
+void Servo::begin(const JointRef& posture) noexcept {
+  nominal_ = options_.posture.size() != 0 ? options_.posture : JointVector(posture);
   for (int i = 0; i < chain_.dof(); ++i) {
     if (chain_.joint_types()[static_cast<std::size_t>(i)] != JointType::Continuous) continue;
     constexpr double kTurn = 6.283185307179586;
-    nominal_[i] += kTurn * std::round((q[i] - nominal_[i]) / kTurn);
+    nominal_[i] += kTurn * std::round((tracker_.q()[i] - nominal_[i]) / kTurn);
   }
   solver_.reset();
   least_squares_.reset();
   exact_spectrum_ = Spectrum{};
   sigmaik::update(chain_, tracker_.q(), state_);
   fade_ = 0.0;
+}
+
+void Servo::continue_from(const Servo& other) {
+  tracker_.continue_from(other.tracker_);
+  if (other.tracker_.q().size() == 0) return;
+  qdot_start_ = other.tracker_.qdot();
+  begin(other.nominal_);
 }
 
 void Servo::set_method(const Method& method) { solver_.set_method(method); }
@@ -204,6 +215,7 @@ ServoStep Servo::resolve(const Twist& twist, bool fade) noexcept {
   if (solution.status == Status::BadInput) return stop(Status::BadInput);
 
   ServoStep step;
+  step.asked_twist = twist;
   step.status = solution.status;
   step.singular_values = solution.singular_values;
   step.singular = solution.singular;

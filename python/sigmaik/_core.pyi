@@ -7,7 +7,7 @@ import enum
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['AdaptiveDampedLeastSquares', 'AnalyticBranch', 'AnalyticIk', 'ArmSpheres', 'CartError', 'CartLaw', 'CartRegion', 'Chain', 'ConstrainedIk', 'ConstrainedIkStep', 'DEFAULT_SCALE', 'DampedLeastSquares', 'DistanceField', 'Dynamics', 'Error', 'JParse', 'JacobianProjection', 'JacobianSafety', 'JacobianSafetyProjection', 'JointCost', 'JointLimits', 'LeastSquaresSolution', 'PseudoInverse', 'SelectivelyDampedLeastSquares', 'Servo', 'ServoStep', 'SingularSets', 'Solution', 'Spectrum', 'Status', 'SupportPlanner', 'SupportStates', 'TimeOptimal', 'TimeOptimalResult', 'VelocitySolver', 'cart_descent', 'cart_law', 'collision_cost', 'evaluate_index', 'forbidden_intervals', 'geometry_aware_cost', 'index_of_jacobian', 'joint_limit_cost', 'known_singular_sets', 'least_squares', 'load_singular_sets', 'log_manipulability_cost', 'manipulability_cost', 'min_distance', 'pose_error', 'potential_cost', 'reference_scale', 'rotation_exp', 'rotation_log', 'self_collision_cost', 'self_collision_pairs', 'singular_sets_of', 'solve_batch', 'spline_velocities', 'sum_of_costs', 'taut_string']
+__all__: list[str] = ['AdaptiveDampedLeastSquares', 'AnalyticBranch', 'AnalyticIk', 'ArmSpheres', 'CartError', 'CartLaw', 'CartRegion', 'Chain', 'ConstrainedIk', 'ConstrainedIkStep', 'DEFAULT_SCALE', 'DampedLeastSquares', 'DistanceField', 'Dynamics', 'Error', 'JParse', 'JacobianProjection', 'JacobianSafety', 'JacobianSafetyProjection', 'JointCost', 'JointLimits', 'LeastSquaresSolution', 'LoopCommand', 'LoopStatistics', 'PseudoInverse', 'SelectivelyDampedLeastSquares', 'Servo', 'ServoLoop', 'ServoStep', 'SingularSets', 'Solution', 'Spectrum', 'Status', 'SupportPlanner', 'SupportStates', 'TimeOptimal', 'TimeOptimalResult', 'VelocitySolver', 'cart_descent', 'cart_law', 'collision_cost', 'evaluate_index', 'forbidden_intervals', 'geometry_aware_cost', 'index_of_jacobian', 'joint_limit_cost', 'known_singular_sets', 'least_squares', 'load_singular_sets', 'log_manipulability_cost', 'manipulability_cost', 'min_distance', 'pose_error', 'potential_cost', 'reference_scale', 'rotation_exp', 'rotation_log', 'self_collision_cost', 'self_collision_pairs', 'singular_sets_of', 'solve_batch', 'spline_velocities', 'sum_of_costs', 'taut_string']
 class Error(ValueError):
     """
     What set-up and checked calls refuse. The text carries the facts.
@@ -501,6 +501,11 @@ class ServoStep:
         (6,) J q̇ [m/s, rad/s]
         """
     @property
+    def asked_twist(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (6,) what the rule was given: the twist command, or the pose error's [m/s, rad/s]
+        """
+    @property
     def limiting_joints(self) -> tuple[int, ...]:
         """
         Indices of the joints held at a limit that the rule's answer would break.
@@ -567,6 +572,16 @@ class Servo:
         exact: (6,) truth values: rows (vx, vy, vz, ωx, ωy, ωz) that come before the others when redistributing.
         length_scale, mask, frame: as for VelocitySolver.
         """
+    def continue_from(self, other: Servo) -> None:
+        """
+        Takes over from another servo of the same arm and dt, in the midst of its motion.
+
+        Rule and options are this one's; what it commands is faded in from the other's last velocity over soft_start.
+        """
+    def hold(self) -> ServoStep:
+        """
+        One cycle of the fastest stop that the limits allow, or of rest: HOLDING.
+        """
     def reset(self, q: numpy.typing.ArrayLike, qdot: numpy.typing.ArrayLike | None = None) -> None:
         """
         Starts, or starts again, at q (n,): forgets all history, and pins the posture there unless one was given.
@@ -609,6 +624,108 @@ class Servo:
         """
         (n,) where the reference stands.
         """
+class LoopCommand(enum.IntEnum):
+    """
+    What a cycle of a ServoLoop followed.
+    """
+    HOLD = ...
+    POSE = ...
+    STALE = ...
+    TWIST = ...
+class LoopStatistics:
+    """
+    How a ServoLoop keeps its rate.
+    """
+    @property
+    def cycles(self) -> int:
+        ...
+    @property
+    def elapsed(self) -> float:
+        """
+        [s] since start(), or from start() to stop().
+        """
+    @property
+    def missed(self) -> int:
+        """
+        Cycles left out, as their time had passed.
+        """
+    @property
+    def rate(self) -> float:
+        """
+        [Hz] cycles a second.
+        """
+    @property
+    def unread(self) -> int:
+        """
+        Samples lost, as nobody read them in time.
+        """
+    @property
+    def worst_delay(self) -> float:
+        """
+        [s] from when a cycle was due to its start.
+        """
+class ServoLoop:
+    """
+    A servo in a thread of its own, at its own rate, whatever Python does meanwhile.
+
+    Commands hold until they are stale: an arm whose commander hangs, or is gone, stops by itself, within its
+    limits. Late cycles are counted and left out, never made up for by a burst.
+    """
+    def __enter__(self) -> typing.Any:
+        ...
+    def __exit__(self, *args) -> None:
+        ...
+    def __init__(self, servo: Servo, *, history: typing.SupportsInt | typing.SupportsIndex = 4096, priority: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+        """
+        servo: has started (reset); it is copied.
+        history: samples kept for read(), a power of 2.
+        priority: of SCHED_FIFO, 1 to 99; 0 is the ordinary scheduler.
+        """
+    def configure(self, servo: Servo, restart: bool = False) -> None:
+        """
+        Goes on with another servo (a copy) of the same arm and dt: other rule, other options.
+
+        It takes over the motion, or with `restart` starts where it was reset to: for arms that do not exist.
+        """
+    def follow(self, target: typing.Any, timeout: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        """
+        Follows a pose (4, 4) of the tip in the base, for `timeout` [s] unless it is said again.
+        """
+    def follow_twist(self, twist: numpy.typing.ArrayLike, timeout: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        """
+        Follows a twist (6,) [v; ω], base axes, at the tip's origin, for `timeout` [s] unless it is said again.
+        """
+    def hold(self) -> None:
+        """
+        Stops as fast as limits allow, and rests.
+        """
+    def read(self) -> numpy.ndarray:
+        """
+        (N,) structured array: what was done in each cycle since the last call.
+
+        cycle, time [s] since start(), command (LoopCommand), restarted, status (Status), q and qdot (n,), target and
+        pose (4, 4) of the tip, pose_error, asked_twist and achieved_twist (6,), singular_values (NaN while holding),
+        singular and limiting_joints (bits), scale.
+        """
+    def start(self) -> None:
+        """
+        Starts the thread. Raises Error where it runs already, or the system refuses the priority.
+        """
+    def stop(self) -> None:
+        """
+        Brings the arm to rest, in a second at most, and ends the thread.
+        """
+    @property
+    def dt(self) -> float:
+        """
+        [s]
+        """
+    @property
+    def running(self) -> bool:
+        ...
+    @property
+    def statistics(self) -> LoopStatistics:
+        ...
 class Dynamics:
     """
     Rigid-body dynamics M(q) q̈ + C(q, q̇) q̇ + g(q) = τ of a chain, by KDL's ChainDynParam.

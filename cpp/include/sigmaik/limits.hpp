@@ -77,6 +77,12 @@ class LimitTracker {
   /// \throws Error where a size is wrong or an entry is not finite
   void reset(const JointRef& q, const JointRef& qdot = JointVector());
 
+  /// Starts where another tracker of as many joints stands, in the midst of its motion: with its positions, velocities and,
+  /// of joints with a jerk limit there, accelerations. Limits that did not hold there hold as after a reset(). Where the
+  /// other has not started, nothing happens. Real time.
+  /// \throws Error where the number of joints or dt differ
+  void continue_from(const LimitTracker& other);
+
   /// Of the coming cycle; empty before reset().
   const VelocityBounds& bounds() const noexcept { return bounds_; }
 
@@ -125,6 +131,7 @@ class LimitTracker {
   bool move(JointVector& qdot) noexcept;
   template <int kPadded>
   unsigned survey() noexcept;
+  void clear() noexcept;
   void update() noexcept;
   double towards(const Joint& joint, double room) const noexcept;
   void bound(int i) noexcept;

@@ -63,6 +63,7 @@ struct ServoStep {
   JointVector qdot;                  ///< (n,) velocity command over the last dt
   Status status = Status::BadInput;
   Twist pose_error = Twist::Zero();  ///< target minus tip before the step, unshortened; zero for twist commands
+  Twist asked_twist = Twist::Zero();     ///< what the rule was given: the twist command, or the pose error's
   Twist achieved_twist = Twist::Zero();  ///< J q̇
   /// In [0, 1], what limits left: of the rule's speed (Scale), or of its twist along itself (Redistribute).
   double scale = 1.0;
@@ -95,6 +96,15 @@ class Servo {
   /// One cycle along a twist [v; ω], base axes, at the tip's origin. Real time.
   ServoStep update_twist(const Twist& twist) noexcept;
 
+  /// One cycle of the fastest stop that the limits allow, or of rest: Holding. Real time.
+  ServoStep hold() noexcept { return stop(Status::Holding); }
+
+  /// Takes over from another servo of the same arm and dt, in the midst of its motion: rule and options are this one's, and
+  /// what it commands is faded in from the other's last velocity over soft_start. The posture is the other's unless one
+  /// was given. Where the other has not started, nothing happens. Real time.
+  /// \throws Error where the number of joints or dt differ
+  void continue_from(const Servo& other);
+
   /// Changes the rule from the next cycle on; the rest of the history stays.
   /// \throws Error where a parameter is out of its range
   void set_method(const Method& method);
@@ -110,6 +120,7 @@ class Servo {
   const Pose& tip() const noexcept { return state_.tip; }
 
  private:
+  void begin(const JointRef& posture) noexcept;
   ServoStep stop(Status status) noexcept;
   ServoStep resolve(const Twist& twist, bool fade) noexcept;
   JointVector posture_velocity() const noexcept;

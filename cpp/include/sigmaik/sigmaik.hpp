@@ -20,6 +20,7 @@
 ///     singularities.hpp    SingularSets: known singular sets of three arms, potentials, manipulability in closed form
 ///     avoidance.hpp        Avoidance: a posture velocity away from singularities
 ///     servo.hpp            Servo: pose or twist in, joint command out, each cycle
+///     servo_loop.hpp       ServoLoop: a servo in a thread of its own; stale commands stop the arm (not included)
 ///     analytic_ik.hpp      AnalyticIk: every posture of a pose, for six joints with a spherical wrist
 ///     dynamics.hpp         Dynamics: mass matrix, Coriolis, gravity, by KDL (not included)
 ///     constrained_ik.hpp   ConstrainedIk: a pose exactly in part, the rest as limits allow; time scaling (not included)

@@ -1,0 +1,140 @@
+#pragma once
+/// \file servo_loop.hpp
+/// A servo in a thread of its own, at its own rate, whatever the rest of the program does.
+///
+///     ServoLoop loop(servo, [&](const LoopSample& s) { robot.command(s.step.q, s.step.qdot); });
+///     loop.start();
+///     loop.follow(target, 0.25);     // [s] until it is stale, and the arm stops, unless it is said again
+///     loop.read(samples);            // what was done in each cycle, from any other thread
+///
+/// Commands go in and samples come out without a lock in the loop: what commands it may hang, and the arm stops when its
+/// last command is stale. Late cycles are counted and left out, never made up for by a burst.
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <span>
+#include <thread>
+#include <vector>
+
+#include <sigmaik/servo.hpp>
+
+namespace sigmaik {
+
+/// What a cycle followed.
+enum class LoopCommand : std::int8_t {
+  Hold = 0,   ///< nothing: the arm stops, or rests
+  FollowPose = 1,
+  FollowTwist = 2,
+  Stale = 3,  ///< a command that was not said again in time: as Hold
+};
+
+/// What was done in one cycle.
+struct LoopSample {
+  std::int64_t cycle = 0;   ///< from 0, of those that ran
+  double time = 0.0;        ///< [s] since start()
+  LoopCommand command = LoopCommand::Hold;
+  bool restarted = false;   ///< the arm was put where it is: see ServoLoop::configure
+  Pose target = Pose::Identity();  ///< of the pose that is followed, else the tip's
+  Pose tip = Pose::Identity();     ///< after the step, in base
+  ServoStep step;
+};
+
+struct LoopStatistics {
+  std::int64_t cycles = 0;
+  std::int64_t missed = 0;    ///< cycles left out, as their time had passed
+  std::int64_t unread = 0;    ///< samples lost, as nobody read them in time
+  double worst_delay = 0.0;   ///< [s] from when a cycle was due to its start
+  double elapsed = 0.0;       ///< [s] since start(), or from start() to stop()
+  double rate() const noexcept { return elapsed > 0.0 ? static_cast<double>(cycles) / elapsed : 0.0; }
+};
+
+struct ServoLoopOptions {
+  int history = 4096;  ///< samples kept for read(), a power of 2
+  int priority = 0;    ///< of SCHED_FIFO, 1 to 99; 0 is the ordinary scheduler
+};
+
+/// All functions may be called from any thread.
+class ServoLoop {
+ public:
+  /// Called in the loop's thread, once a cycle: real time is then in its hands. Must not throw.
+  using Sink = std::function<void(const LoopSample&)>;
+
+  /// \throws Error where the servo has not started, or an option is out of its range
+  explicit ServoLoop(Servo servo, Sink sink = {}, const ServoLoopOptions& options = {});
+  ~ServoLoop();  ///< stop()
+  ServoLoop(const ServoLoop&) = delete;
+  ServoLoop& operator=(const ServoLoop&) = delete;
+
+  /// \throws Error where it runs already, or the system refuses the priority
+  void start();
+  /// Brings the arm to rest, in a second at most, and ends the thread.
+  void stop() noexcept;
+  bool running() const noexcept { return thread_running_.load(std::memory_order_acquire); }
+
+  /// From the next cycle on, for `timeout` seconds.
+  /// \throws Error where the target is not a pose, or the timeout not above 0
+  void follow(const Pose& target, double timeout);
+  /// \param twist [v; ω], base axes, at the tip's origin
+  void follow_twist(const Twist& twist, double timeout);
+  void hold() noexcept;
+
+  /// Goes on with another servo of the same arm and dt: other rule, other options. From the next cycle on it takes over
+  /// the motion (Servo::continue_from), or with `restart` starts where it was reset to: for arms that do not exist.
+  /// \throws Error where joints or dt differ, or with `restart` the servo has not started
+  void configure(Servo next, bool restart = false);
+
+  /// Copies out the oldest samples that nobody has read, and forgets them.
+  /// \return how many
+  std::size_t read(std::span<LoopSample> out);
+
+  LoopStatistics statistics() const noexcept;
+  double dt() const noexcept { return dt_; }
+  int dof() const noexcept { return dof_; }
+
+ private:
+  struct Command {
+    LoopCommand kind = LoopCommand::Hold;
+    std::int64_t deadline = 0;  // [ns] of the steady clock
+    Pose target = Pose::Identity();
+    Twist twist = Twist::Zero();
+  };
+  struct Driver {
+    Servo servo;
+    bool restart = false;
+    Driver* next = nullptr;  // of those that are done
+  };
+
+  void post(const Command& command) noexcept;
+  const Command& latest() noexcept;
+  void run() noexcept;
+  LoopSample cycle(bool stopping) noexcept;
+  void take_over() noexcept;
+  void sweep() noexcept;
+  std::int64_t since_start() const noexcept;
+
+  double dt_;
+  int dof_;
+  Sink sink_;
+  ServoLoopOptions options_;
+  std::mutex callers_;  // never taken by the loop
+
+  // Three commands: one is written, one is read, one waits. Bit 2 of the waiting one's number: nobody has read it yet.
+  std::array<Command, 3> commands_;
+  std::atomic<unsigned> waiting_{1};
+  unsigned writing_ = 0, reading_ = 2;
+
+  Driver* driver_;  // the loop's
+  std::atomic<Driver*> incoming_{nullptr}, done_{nullptr};
+
+  std::vector<LoopSample> samples_;
+  std::atomic<std::uint64_t> head_{0}, tail_{0};
+
+  std::thread thread_;
+  std::atomic<bool> stopping_{false}, thread_running_{false};
+  std::atomic<std::int64_t> begun_{0}, ended_{0}, cycles_{0}, missed_{0}, unread_{0}, worst_delay_{0};
+};
+
+}  // namespace sigmaik
