@@ -45,6 +45,7 @@ py::dtype sample_dtype(int dof) {
   add("cycle", "<i8");
   add("time", "<f8");
   add("command", "i1");
+  add("configuration", "<i4");
   add("restarted", "?");
   add("status", "i1");
   add_array("q", py::make_tuple(dof));
@@ -66,6 +67,7 @@ void write(const LoopSample& s, int dof, char* at) {
   record.put(s.cycle);
   record.put(s.time);
   record.put(static_cast<std::int8_t>(s.command));
+  record.put(static_cast<std::int32_t>(s.configuration));
   record.put(s.restarted);
   record.put(static_cast<std::int8_t>(s.step.status));
   record.put_all(s.step.q);
@@ -146,10 +148,11 @@ void bind_servo_loop(py::module_& m) {
       .def("hold", &ServoLoop::hold, "Stops as fast as limits allow, and rests.")
       .def("configure", &ServoLoop::configure, py::arg("servo"), py::arg("restart") = false,
            "Goes on with another servo (a copy) of the same arm and dt: other rule, other options.\n\n"
-           "It takes over the motion, or with `restart` starts where it was reset to: for arms that do not exist.")
+           "It takes over the motion, or with `restart` starts where it was reset to: for arms that do not exist.\n"
+           "Returns a number, one more each time, by which samples tell it; 0 is the first servo's.")
       .def("read", &read,
            "(N,) structured array: what was done in each cycle since the last call.\n\n"
-           "cycle, time [s] since start(), command (LoopCommand), restarted, status (Status), q and qdot (n,), target and\n"
+           "cycle, time [s] since start(), command (LoopCommand), configuration, restarted, status (Status), q and qdot (n,), target and\n"
            "pose (4, 4) of the tip, pose_error, asked_twist and achieved_twist (6,), singular_values (NaN while holding),\n"
            "singular and limiting_joints (bits), scale.")
       .def_property_readonly("statistics", &ServoLoop::statistics)

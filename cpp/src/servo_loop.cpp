@@ -101,14 +101,14 @@ const ServoLoop::Command& ServoLoop::latest() noexcept {
   return commands_[reading_];
 }
 
-void ServoLoop::configure(Servo next, bool restart) {
+int ServoLoop::configure(Servo next, bool restart) {
   require(next.chain().dof() == dof_, "the servo has ", next.chain().dof(), " joints, the loop's ", dof_);
   require(next.options().dt == dt_, "the servo has dt = ", next.options().dt, " s, the loop's ", dt_);
   require(!restart || next.q().size() != 0, "the servo has no start: call reset(q) first");
   const std::lock_guard lock(callers_);
   sweep();
   // A servo that never began: its successor starts where it would have.
-  Driver* const driver = new Driver{std::move(next), restart};
+  Driver* const driver = new Driver{std::move(next), ++configurations_, restart};
   Driver* const skipped = incoming_.exchange(nullptr, std::memory_order_acq_rel);
   if (skipped != nullptr && skipped->restart && !restart) {
     driver->servo.continue_from(skipped->servo);
@@ -116,6 +116,7 @@ void ServoLoop::configure(Servo next, bool restart) {
   }
   delete skipped;
   incoming_.store(driver, std::memory_order_release);
+  return configurations_;
 }
 
 void ServoLoop::take_over() noexcept {
@@ -140,6 +141,7 @@ LoopSample ServoLoop::cycle(bool stopping) noexcept {
   Driver* const before = driver_;
   take_over();
   sample.restarted = driver_ != before && driver_->restart;
+  sample.configuration = driver_->number;
   Servo& servo = driver_->servo;
   const Command& command = latest();
   sample.time = 1e-9 * static_cast<double>(since_start());

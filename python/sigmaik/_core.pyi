@@ -681,11 +681,12 @@ class ServoLoop:
         history: samples kept for read(), a power of 2.
         priority: of SCHED_FIFO, 1 to 99; 0 is the ordinary scheduler.
         """
-    def configure(self, servo: Servo, restart: bool = False) -> None:
+    def configure(self, servo: Servo, restart: bool = False) -> int:
         """
         Goes on with another servo (a copy) of the same arm and dt: other rule, other options.
 
         It takes over the motion, or with `restart` starts where it was reset to: for arms that do not exist.
+        Returns a number, one more each time, by which samples tell it; 0 is the first servo's.
         """
     def follow(self, target: typing.Any, timeout: typing.SupportsFloat | typing.SupportsIndex) -> None:
         """
@@ -703,7 +704,7 @@ class ServoLoop:
         """
         (N,) structured array: what was done in each cycle since the last call.
 
-        cycle, time [s] since start(), command (LoopCommand), restarted, status (Status), q and qdot (n,), target and
+        cycle, time [s] since start(), command (LoopCommand), configuration, restarted, status (Status), q and qdot (n,), target and
         pose (4, 4) of the tip, pose_error, asked_twist and achieved_twist (6,), singular_values (NaN while holding),
         singular and limiting_joints (bits), scale.
         """

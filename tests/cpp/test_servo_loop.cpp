@@ -245,8 +245,8 @@ TEST_CASE("restarting puts the arm elsewhere, also through a change that follows
   JointVector q = home();
   q[0] = 1.0;
   elsewhere.reset(q);
-  loop.configure(elsewhere, true);
-  loop.configure(Servo(panda(), DampedLeastSquares{}));
+  CHECK(loop.configure(elsewhere, true) == 1);
+  CHECK(loop.configure(Servo(panda(), DampedLeastSquares{})) == 2);
   wait(0.05);
   loop.stop();
   const auto samples = read_all(loop);
@@ -254,6 +254,7 @@ TEST_CASE("restarting puts the arm elsewhere, also through a change that follows
   for (const LoopSample& s : samples) restarts += s.restarted ? 1 : 0;
   CHECK(restarts == 1);
   CHECK(samples.back().step.q == q);
+  CHECK(samples.back().configuration == 2);
 }
 
 TEST_CASE("nobody reads: samples are counted, the loop goes on") {

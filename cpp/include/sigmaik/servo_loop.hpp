@@ -36,6 +36,7 @@ struct LoopSample {
   std::int64_t cycle = 0;   ///< from 0, of those that ran
   double time = 0.0;        ///< [s] since start()
   LoopCommand command = LoopCommand::Hold;
+  int configuration = 0;    ///< what configure() answered when this cycle's servo was given; 0: the first one
   bool restarted = false;   ///< the arm was put where it is: see ServoLoop::configure
   Pose target = Pose::Identity();  ///< of the pose that is followed, else the tip's
   Pose tip = Pose::Identity();     ///< after the step, in base
@@ -83,8 +84,9 @@ class ServoLoop {
 
   /// Goes on with another servo of the same arm and dt: other rule, other options. From the next cycle on it takes over
   /// the motion (Servo::continue_from), or with `restart` starts where it was reset to: for arms that do not exist.
+  /// \return a number, one more each time, by which samples tell it
   /// \throws Error where joints or dt differ, or with `restart` the servo has not started
-  void configure(Servo next, bool restart = false);
+  int configure(Servo next, bool restart = false);
 
   /// Copies out the oldest samples that nobody has read, and forgets them.
   /// \return how many
@@ -103,6 +105,7 @@ class ServoLoop {
   };
   struct Driver {
     Servo servo;
+    int number = 0;
     bool restart = false;
     Driver* next = nullptr;  // of those that are done
   };
@@ -120,6 +123,7 @@ class ServoLoop {
   Sink sink_;
   ServoLoopOptions options_;
   std::mutex callers_;  // never taken by the loop
+  int configurations_ = 0;
 
   // Three commands: one is written, one is read, one waits. Bit 2 of the waiting one's number: nobody has read it yet.
   std::array<Command, 3> commands_;
