@@ -1,0 +1,18 @@
+"""Driving an arm by hand: a servo in a thread of its own, its commands, its settings, and recordings.
+
+    session = sk.teleop.Session("ufactory_xarm7")
+    with session:                                  # starts the servo, and stops it
+        session.start_recording()
+        session.follow(target)                     # (4, 4); or session.twist([vx, vy, vz, wx, wy, wz])
+        session.configure(method="dls")            # under way, without a kick
+        episode = session.stop_recording()
+    episode.save("episode.npz")
+
+`sigmaik teleop` puts a page in the browser before it (`sigmaik.teleop.page`, extra `viewer`).
+"""
+
+from .episode import Episode
+from .session import Session
+from .settings import Settings
+
+__all__ = ["Episode", "Session", "Settings"]

@@ -1,0 +1,125 @@
+"""Gamepads and SpaceMice as twists (extra `devices`). A device that is not there is said, not guessed.
+
+Both move only while a button is held (the dead man's switch): the left shoulder button of a gamepad, the left button
+of a SpaceMouse. They are plugged into the machine that runs the servo.
+"""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sigmaik.console import need
+
+__all__ = ["DEVICES", "DeviceError", "Gamepad", "Reading", "SpaceMouse", "TwistDevice", "open_device"]
+
+Array = NDArray[np.float64]
+
+DEAD_ZONE = 0.12  #: of a stick's travel, in which it counts as let go
+
+
+class DeviceError(ValueError):
+    """A device is not there, or no longer."""
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What a device says now."""
+
+    twist: Array  #: (6,) [v; ω], each in [−1, 1], base axes: x ahead, y to the left, z up
+    held: bool  #: whether the dead man's switch is held
+
+
+class TwistDevice(Protocol):
+    """What drives an arm by twists."""
+
+    name: str
+
+    def read(self) -> Reading:
+        """What it says now. DeviceError where it is gone."""
+
+    def close(self) -> None: ...
+
+
+class Gamepad:
+    """The first gamepad that SDL finds. Left stick: x and y; right stick: turn about z, and z; triggers: none."""
+
+    def __init__(self) -> None:
+        need("pygame", "devices")
+        os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
+        os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
+        os.environ.setdefault("SDL_JOYSTICK_ALLOW_BACKGROUND_EVENTS", "1")
+        import pygame
+
+        self._pygame = pygame
+        pygame.display.init()
+        pygame.joystick.init()
+        if pygame.joystick.get_count() == 0:
+            pygame.joystick.quit()
+            raise DeviceError("no gamepad is plugged in")
+        self._pad = pygame.joystick.Joystick(0)
+        self._id = self._pad.get_instance_id()
+        self.name = f"gamepad {self._pad.get_name()}"
+        if self._pad.get_numaxes() < 4 or self._pad.get_numbuttons() < 5:
+            name, self.name = self.name, ""
+            self.close()
+            raise DeviceError(f"{name} has fewer than two sticks or five buttons")
+
+    def read(self) -> Reading:
+        for event in self._pygame.event.get():
+            if event.type == self._pygame.JOYDEVICEREMOVED and event.instance_id == self._id:
+                raise DeviceError(f"{self.name} is gone")
+        x, y, turn, z = (_outside_dead_zone(self._pad.get_axis(i)) for i in range(4))
+        return Reading(np.array([-y, -x, -z, 0.0, 0.0, -turn]), bool(self._pad.get_button(4)))
+
+    def close(self) -> None:
+        self._pygame.joystick.quit()
+
+
+class SpaceMouse:
+    """The first SpaceMouse that is found."""
+
+    def __init__(self) -> None:
+        need("pyspacemouse", "devices")
+        import pyspacemouse
+
+        try:
+            self._mouse = pyspacemouse.open()
+        except Exception as error:  # the library's own, of several kinds, and those of its HID layer
+            raise DeviceError(f"no SpaceMouse can be opened: {' '.join(str(error).split())}") from None
+        if self._mouse is None:
+            raise DeviceError("no SpaceMouse is plugged in")
+        self.name = f"SpaceMouse {self._mouse.name}"
+
+    def read(self) -> Reading:
+        try:
+            state: Any = self._mouse.read()
+        except Exception as error:
+            raise DeviceError(f"{self.name} is gone: {' '.join(str(error).split())}") from None
+        # Its y is ahead and its x to the right; roll is about y, pitch about x.
+        twist = np.array([state.y, -state.x, state.z, -state.roll, -state.pitch, -state.yaw])
+        return Reading(np.clip(np.nan_to_num(twist), -1.0, 1.0), bool(state.buttons and state.buttons[0]))
+
+    def close(self) -> None:
+        self._mouse.close()
+
+
+#: Name to class, of what `open_device` opens.
+DEVICES: dict[str, type[Gamepad] | type[SpaceMouse]] = {"gamepad": Gamepad, "spacemouse": SpaceMouse}
+
+
+def open_device(name: str) -> TwistDevice:
+    """A device by name. ValueError where there is no such name; DeviceError, one too, where it is not there."""
+    if name not in DEVICES:
+        raise ValueError(f"there is no device '{name}'; there are {', '.join(DEVICES)}")
+    return DEVICES[name]()
+
+
+def _outside_dead_zone(value: float) -> float:
+    """From 0 at the dead zone's edge to ±1."""
+    size = (min(abs(value), 1.0) - DEAD_ZONE) / (1.0 - DEAD_ZONE)
+    return float(np.copysign(size, value)) if size > 0.0 else 0.0

@@ -1,0 +1,252 @@
+"""One arm that is driven by hand."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import pathlib
+import threading
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+import sigmaik as sk
+from sigmaik.experiments.reach import load_arm
+
+from .episode import Arm, Episode
+from .settings import Settings
+
+__all__ = ["Session"]
+
+Array = NDArray[np.float64]
+Samples = NDArray[np.void]
+
+#: Joints whose acceleration limit nobody gave may do this [rad/s² or m/s²]: a hand's command is never smooth.
+ACCELERATION = 10.0
+#: The longest recording [cycles]: ten minutes at 1 kHz, half a gigabyte.
+LONGEST_RECORDING = 600_000
+
+
+class Session:
+    """A simulated arm, its servo in a thread, and what is asked of it. Its functions may be called from any thread.
+
+    What follows a pose or a twist goes stale: the arm stops within its limits unless the command is said again in
+    time. `refresh` says a pose again; whoever watches over the commander calls it while the commander is alive.
+    """
+
+    def __init__(
+        self,
+        robot: str = "ufactory_xarm7",
+        *,
+        base: str | None = None,
+        tip: str | None = None,
+        settings: Settings | None = None,
+        rate: float = 1000.0,
+        start: ArrayLike | None = None,
+        acceleration: float = ACCELERATION,
+        pose_timeout: float = 2.0,
+        twist_timeout: float = 0.2,
+        longest_recording: int = LONGEST_RECORDING,
+    ) -> None:
+        """
+        robot: a shipped arm or a URDF file; base, tip: link names
+        rate: [Hz] of the servo
+        start: (n,) [rad or m], by default the arm's home
+        acceleration: [rad/s² or m/s²] limit of joints that have none
+        pose_timeout, twist_timeout: [s] after which a command is stale
+        longest_recording: [cycles], where a recording ends by itself
+        ValueError where one is wrong, with the facts.
+        """
+        name, chain, home = load_arm(robot, base, tip)
+        if not 1.0 <= rate <= 20e3:
+            raise ValueError(f"rate must be from 1 to 20000 Hz, not {rate:g}")
+        for what, value in (
+            ("acceleration", acceleration),
+            ("pose_timeout", pose_timeout),
+            ("twist_timeout", twist_timeout),
+        ):
+            if not 0.0 < value < math.inf:
+                raise ValueError(f"{what} must be above 0 and finite, not {value:g}")
+        known = chain.limits.acceleration
+        #: Names of the joints whose acceleration limit is assumed.
+        self.assumed = tuple(
+            joint for joint, limit in zip(chain.joint_names, known, strict=True) if not math.isfinite(limit)
+        )
+        self.name = name
+        self.source = sk.robots.path(robot) if robot in sk.robots.names() else pathlib.Path(robot)
+        self.chain = chain.with_limits(acceleration=np.where(np.isfinite(known), known, acceleration))
+        self.home: Array = home if start is None else np.array(start, dtype=np.float64)
+        self.pose_timeout, self.twist_timeout = pose_timeout, twist_timeout
+        self.longest_recording = longest_recording
+        self._settings = settings or Settings()
+        self._dt = 1.0 / rate
+        servo = self._settings.servo(self.chain, self._dt, self.home)
+        servo.reset(self.home)
+        self._loop = sk.ServoLoop(servo, history=_power_of_two(2.0 * rate))
+        self._goal: Array | None = None
+        self._lock = threading.RLock()
+        self._latest: Samples | None = None
+        self._recorded: list[Samples] | None = None
+        self._from = 0  # the configuration with which the recording begins
+        self._before: tuple[Array, Array] | None = None  # q and q̇ ahead of it
+        self._history: dict[int, Settings] = {0: self._settings}
+
+    def __enter__(self) -> Session:
+        self._loop.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._loop.stop()
+
+    # --- commands
+
+    def follow(self, target: ArrayLike) -> None:
+        """Drives the tip to a pose (4, 4) in base. ValueError where it is none, or too far away to be meant."""
+        pose: Array = np.array(target, dtype=np.float64)
+        if pose.shape != (4, 4) or not np.isfinite(pose).all():
+            raise ValueError("the target must be a 4×4 pose of finite numbers")
+        if np.abs(pose[:3, 3]).max() > 100.0:
+            raise ValueError("the target is more than 100 m away")
+        with self._lock:
+            self._loop.follow(pose, self.pose_timeout)
+            self._goal = pose
+
+    def refresh(self) -> None:
+        """Says the pose that is followed again, so that it does not go stale."""
+        with self._lock:
+            if self._goal is not None:
+                self._loop.follow(self._goal, self.pose_timeout)
+
+    def twist(self, twist: ArrayLike) -> None:
+        """Moves the tip along [v; ω] (6,) [m/s, rad/s], base axes, for `twist_timeout`."""
+        with self._lock:
+            self._loop.follow_twist(twist, self.twist_timeout)
+            self._goal = None
+
+    def hold(self) -> None:
+        """Stops as fast as the limits allow."""
+        with self._lock:
+            self._goal = None
+            self._loop.hold()
+
+    def restart(self, q: ArrayLike | None = None) -> None:
+        """Puts the (simulated) arm at q (n,), by default where it started, and ends a recording's run of cycles."""
+        with self._lock:
+            self.hold()
+            servo = self._settings.servo(self.chain, self._dt, self.home)
+            servo.reset(self.home if q is None else q)
+            self._history[self._loop.configure(servo, restart=True)] = self._settings
+
+    @property
+    def goal(self) -> Array | None:
+        """(4, 4) the pose that is followed."""
+        return self._goal
+
+    # --- settings
+
+    @property
+    def settings(self) -> Settings:
+        return self._settings
+
+    def configure(self, **changes: Any) -> None:
+        """Changes settings by name, under way. ValueError, and all stays, where one is wrong."""
+        with self._lock:
+            settings = self._settings.with_(**changes)
+            servo = settings.servo(self.chain, self._dt, self.home)
+            self._history[self._loop.configure(servo)] = settings
+            self._settings = settings
+
+    # --- what happens
+
+    def read(self) -> Samples:
+        """(N,) what was done since the last call, see `ServoLoop.read`. Recordings live on this: call it often."""
+        with self._lock:
+            samples: Samples = self._loop.read()
+            if self._recorded is not None:
+                self._record(samples)
+            if len(samples):
+                self._latest = samples[-1:].copy()
+            return samples
+
+    def _record(self, samples: Samples) -> None:
+        assert self._recorded is not None
+        first = int(np.searchsorted(samples["configuration"], self._from))  # configurations only ever grow
+        if first == len(samples):
+            return
+        if not self._recorded:
+            before = samples[first - 1] if first > 0 else self.latest
+            self._before = (before["q"].copy(), before["qdot"].copy()) if before is not None else None
+        self._recorded.append(samples[first : first + self.longest_recording - self.recorded])
+
+    @property
+    def latest(self) -> Any:
+        """The newest sample that `read` has seen; None before the first."""
+        return None if self._latest is None else self._latest[0]
+
+    @property
+    def statistics(self) -> sk.LoopStatistics:
+        """How the servo keeps its rate."""
+        return self._loop.statistics
+
+    @property
+    def rate(self) -> float:
+        """[Hz] that was asked for."""
+        return 1.0 / self._dt
+
+    # --- recording
+
+    @property
+    def recording(self) -> bool:
+        return self._recorded is not None
+
+    @property
+    def recorded(self) -> int:
+        """Cycles recorded so far."""
+        return sum(map(len, self._recorded or []))
+
+    @property
+    def recording_full(self) -> bool:
+        """Whether the recording has reached its longest."""
+        return self.recorded >= self.longest_recording
+
+    def start_recording(self) -> None:
+        """From the next cycle on. ValueError where it is recording already."""
+        with self._lock:
+            if self._recorded is not None:
+                raise ValueError("it is recording already")
+            self.read()
+            # A servo without a past: so that the recording can be played again to the bit.
+            servo = self._settings.servo(self.chain, self._dt, self.home)
+            self._from = self._loop.configure(servo)
+            self._history[self._from] = self._settings
+            self._recorded = []
+
+    def stop_recording(self) -> Episode:
+        """What was recorded. ValueError where nothing was."""
+        with self._lock:
+            if self._recorded is None:
+                raise ValueError("it is not recording")
+            self.read()
+            recorded, self._recorded = self._recorded, None
+            samples = np.concatenate(recorded) if recorded else np.empty(0)
+            if len(samples) == 0:
+                raise ValueError("no cycle was recorded")
+            start = samples[0]
+            before = self._before or (start["q"] - self._dt * start["qdot"], np.zeros(self.chain.dof))
+            used = set(np.unique(samples["configuration"]).tolist())
+            return Episode(
+                samples,
+                Arm(self.name, self.source.read_text(encoding="utf-8"), self.chain, self.home),
+                self._dt,
+                {number: s for number, s in self._history.items() if number in used},
+                before,
+            )
+
+    def describe(self) -> dict[str, Any]:
+        """Settings as plain values."""
+        return dataclasses.asdict(self._settings)
+
+
+def _power_of_two(least: float) -> int:
+    return 1 << max(6, math.ceil(math.log2(least)))

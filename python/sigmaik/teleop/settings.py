@@ -1,0 +1,79 @@
+"""What can be changed while an arm is driven."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields, replace
+
+import sigmaik as sk
+from sigmaik.experiments import methods
+from sigmaik.experiments import settings as experiment
+
+__all__ = ["Settings"]
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Rule, gains, limits and task of a `Session`'s servo. ValueError where one is out of its range."""
+
+    method: str = "jparse"  #: as for `sigmaik reach`: "jparse", "dls:damping=0.05"
+    gamma: float = 0.1  #: γ of J-PARSE and its ablations, threshold on σ_i/σ_max
+    singular_gain: float = 1.0  #: J-PARSE's gain in singular directions
+    gain_linear: float = 5.0  #: [1/s] position error to velocity
+    gain_angular: float = 5.0  #: [1/s] orientation error to angular velocity
+    max_linear_error: float = 0.08  #: [m] longer position errors are shortened to it
+    max_angular_error: float = 0.4  #: [rad] longer orientation errors are shortened to it
+    posture_gain: float = 0.5  #: [1/s] pull towards where the arm started
+    limits: bool = True  #: hold all joint limits
+    on_limit: str = "redistribute"  #: or "scale"
+    mask: tuple[bool, ...] = (True,) * 6  #: rows (vx, vy, vz, ωx, ωy, ωz) that matter
+    frame: str = "base"  #: axes of the mask's rows: "base" or "tool"
+    length_scale: float = 1.0  #: [m] 1 rad weighs as much as this length
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value, default = getattr(self, field.name), field.default
+            if isinstance(default, bool | str):
+                if not isinstance(value, type(default)):
+                    raise ValueError(f"{field.name} must be a {type(default).__name__}, not {value!r}")
+            elif isinstance(default, float):
+                if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+                    raise ValueError(f"{field.name} must be a finite number, not {value!r}")
+            elif len(value) != 6 or not all(isinstance(row, bool) for row in value):
+                raise ValueError(f"{field.name} must be six truth values, not {value!r}")
+        self.rule()
+
+    def with_(self, **changes: object) -> Settings:
+        """A copy with the changes; ValueError where a name or a value is wrong."""
+        known = {field.name for field in fields(self)}
+        for name in changes:
+            if name not in known:
+                raise ValueError(f"there is no setting '{name}'; there are {', '.join(sorted(known))}")
+        return replace(self, **changes)  # type: ignore[arg-type]
+
+    def rule(self, rate: float = 1000.0) -> methods.NamedMethod:
+        """The method at a servo's rate [Hz]."""
+        settings = experiment.Settings(rate=rate, gamma=self.gamma, singular_gain=self.singular_gain)
+        return methods.parse_method(self.method, settings)
+
+    def servo(self, chain: sk.Chain, dt: float, posture: object) -> sk.Servo:
+        """A servo with these settings, not started."""
+        return sk.Servo(
+            chain,
+            self.rule(1.0 / dt).method,
+            dt=dt,
+            gain_linear=self.gain_linear,
+            gain_angular=self.gain_angular,
+            max_linear_error=self.max_linear_error,
+            max_angular_error=self.max_angular_error,
+            posture=posture,
+            posture_gain=self.posture_gain,
+            position_limits=self.limits,
+            velocity_limits=self.limits,
+            acceleration_limits=self.limits,
+            jerk_limits=self.limits,
+            on_limit=self.on_limit,
+            length_scale=self.length_scale,
+            mask=self.mask,
+            frame=self.frame,
+        )
