@@ -162,10 +162,13 @@ void bind_servo_loop(py::module_& m) {
              self.cast<ServoLoop&>().start();
              return self;
            })
-      .def("__exit__", [](ServoLoop& loop, const py::args&) {
-        const py::gil_scoped_release release;
-        loop.stop();
-      });
+      .def(
+          "__exit__",
+          [](ServoLoop& loop, const py::object&, const py::object&, const py::object&) {
+            const py::gil_scoped_release release;
+            loop.stop();
+          },
+          py::arg("type"), py::arg("value"), py::arg("traceback"));
 }
 
 }  // namespace sigmaik::bindings

@@ -673,7 +673,7 @@ class ServoLoop:
     """
     def __enter__(self) -> typing.Any:
         ...
-    def __exit__(self, *args) -> None:
+    def __exit__(self, type: typing.Any, value: typing.Any, traceback: typing.Any) -> None:
         ...
     def __init__(self, servo: Servo, *, history: typing.SupportsInt | typing.SupportsIndex = 4096, priority: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
         """

@@ -171,10 +171,11 @@ class Episode:
     def _npz(self, stream: BinaryIO) -> None:
         assert self.samples.dtype.names is not None
         limits = self.arm.chain.limits
+        arrays: dict[str, Any] = {name: self.samples[name] for name in self.samples.dtype.names}
+        arrays |= {name: getattr(limits, name) for name in _LIMITS}
         np.savez_compressed(
             stream,
-            **{name: self.samples[name] for name in self.samples.dtype.names},
-            **{name: getattr(limits, name) for name in _LIMITS},
+            **arrays,
             before=np.stack(self.before),
             joint_names=np.array(self.arm.chain.joint_names),
             home=self.arm.home,

@@ -70,6 +70,7 @@ class Session:
                 raise ValueError(f"{what} must be above 0 and finite, not {value:g}")
         known = chain.limits.acceleration
         #: Names of the joints whose acceleration limit is assumed.
+        self.acceleration = acceleration
         self.assumed = tuple(
             joint for joint, limit in zip(chain.joint_names, known, strict=True) if not math.isfinite(limit)
         )
@@ -229,9 +230,9 @@ class Session:
                 raise ValueError("it is not recording")
             self.read()
             recorded, self._recorded = self._recorded, None
-            samples = np.concatenate(recorded) if recorded else np.empty(0)
-            if len(samples) == 0:
+            if not sum(map(len, recorded)):
                 raise ValueError("no cycle was recorded")
+            samples: Samples = np.concatenate(recorded)
             start = samples[0]
             before = self._before or (start["q"] - self._dt * start["qdot"], np.zeros(self.chain.dof))
             used = set(np.unique(samples["configuration"]).tolist())

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, fields, replace
 
+from numpy.typing import ArrayLike
+
 import sigmaik as sk
 from sigmaik.experiments import methods
 from sigmaik.experiments import settings as experiment
@@ -56,7 +58,7 @@ class Settings:
         settings = experiment.Settings(rate=rate, gamma=self.gamma, singular_gain=self.singular_gain)
         return methods.parse_method(self.method, settings)
 
-    def servo(self, chain: sk.Chain, dt: float, posture: object) -> sk.Servo:
+    def servo(self, chain: sk.Chain, dt: float, posture: ArrayLike) -> sk.Servo:
         """A servo with these settings, not started."""
         return sk.Servo(
             chain,
