@@ -5,8 +5,12 @@ from __future__ import annotations
 import argparse
 import pathlib
 import webbrowser
+from typing import TYPE_CHECKING
 
 from .console import need, terminal
+
+if TYPE_CHECKING:
+    from rich.console import Console
 
 __all__ = ["add_teleop"]
 
@@ -57,11 +61,18 @@ def add_teleop(parser: argparse.ArgumentParser) -> None:
     out.add_argument("--out", default="episodes", type=pathlib.Path, metavar="DIR", help="(%(default)s)")
     out.add_argument("--no-parquet", action="store_true", help="npz files only")
     out.add_argument("--replay", type=pathlib.Path, metavar="FILE", help="show this recording (npz) first")
+    parser.add_argument(
+        "--drill",
+        action="store_true",
+        help="no page: five arms through their singularities by every method, and what the recordings say",
+    )
     parser.set_defaults(run=_teleop)
 
 
 def _teleop(arguments: argparse.Namespace) -> int:
     console = terminal()
+    if arguments.drill:
+        return _drill(console)
     need("viser", "viewer")
     from .teleop import Episode, Session, Settings
     from .teleop.page import Page
@@ -99,6 +110,43 @@ def _teleop(arguments: argparse.Namespace) -> int:
     statistics = session.statistics
     console.print(
         f"{statistics.cycles} cycles at {statistics.rate:.0f} of {session.rate:.0f} Hz, {statistics.missed} left out",
+        highlight=False,
+    )
+    return 0
+
+
+def _drill(console: Console) -> int:
+    from rich import box
+    from rich.progress import Progress
+    from rich.table import Table
+
+    from .teleop.drill import drill
+
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task("driving", total=1.0)
+        rows = drill(progress=lambda part: bar.update(task, completed=part))
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0))
+    for head in ("arm", "method"):
+        table.add_column(head, no_wrap=True)
+    for head in ("cycles", "min σ₆/σ₁", "speed", "broken", "error"):
+        table.add_column(head, justify="right")
+    robot = ""
+    for row in rows:
+        table.add_row(
+            row.robot if row.robot != robot else "",
+            row.method,
+            str(row.cycles),
+            f"{row.smallest_ratio:.2e}",
+            f"{row.largest_speed:.3f}",
+            str(row.broken),
+            f"{1e3 * row.error:.1f} mm",
+        )
+        robot = row.robot
+    console.print(table)
+    broken = sum(row.broken for row in rows)
+    console.print(
+        f"speed: the largest, of its limit. broken: joints times cycles beyond a limit of position, velocity or\n"
+        f"acceleration. error: from home, at the end. {sum(row.cycles for row in rows)} cycles, {broken} broken limits",
         highlight=False,
     )
     return 0

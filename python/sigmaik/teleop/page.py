@@ -198,9 +198,9 @@ class Page:
             self._bind(gamma, "gamma", lambda value: _number(value, 0.0, 1.0))
             for label, name, most in (
                 ("singular gain", "singular_gain", 5.0),
-                ("gain, position [1/s]", "gain_linear", 20.0),
-                ("gain, orientation [1/s]", "gain_angular", 20.0),
-                ("posture gain [1/s]", "posture_gain", 5.0),
+                ("gain [1/s]", "gain_linear", 20.0),
+                ("turn gain [1/s]", "gain_angular", 20.0),
+                ("posture [1/s]", "posture_gain", 5.0),
             ):
                 slider = gui.add_slider(label, 0.0, most, 0.1, getattr(settings, name))
                 self._bind(slider, name, functools.partial(_number, least=0.0, most=most))

@@ -65,9 +65,9 @@ class Scene:
     def __init__(self, server: viser.ViserServer, session: Session) -> None:
         scene = server.scene
         self.reach = _reach(session.chain)
-        server.initial_camera.position = tuple(self.reach * np.array([1.5, -1.5, 1.25]))
-        server.initial_camera.look_at = (0.0, 0.0, 0.4 * self.reach)
-        scene.add_grid("/ground", 4.0 * self.reach, 4.0 * self.reach, cell_size=0.2, section_size=1.0)
+        server.initial_camera.position = tuple(self.reach * np.array([1.0, -1.75, 1.0]))
+        server.initial_camera.look_at = tuple(self.reach * np.array([0.55, 0.15, 0.25]))
+        scene.add_grid("/ground", 3.0 * self.reach, 3.0 * self.reach, cell_size=0.2, section_size=0.6)
         self.robot = RobotView(server, session.source, session.chain)
         self.target = scene.add_transform_controls(
             "/target", scale=0.22 * self.reach, depth_test=False, line_width=3.0
@@ -88,7 +88,7 @@ class Scene:
             for name, colour in (("/singular_linear", _LINEAR), ("/singular_angular", _ANGULAR))
         )
         self.trace = scene.add_line_segments(
-            "/trace", _NOTHING, (0, 0, 0), thickness=3.0, thickness_units="screen"
+            "/trace", _NOTHING, _NOTHING.astype(np.uint8), thickness=3.0, thickness_units="screen"
         )
         self._trace: collections.deque[tuple[Array, tuple[int, int, int]]] = collections.deque(maxlen=_TRACE_LENGTH)
         self._chain, self._ticks = session.chain, 0

@@ -1,0 +1,417 @@
+"""Sessions, recordings, devices and drawings without a browser; the page itself is tested in tests/browser."""
+
+import json
+import sys
+import time
+import types
+
+import numpy as np
+import pytest
+
+import sigmaik as sk
+from sigmaik.cli import main
+from sigmaik.teleop import Episode, Session, Settings, devices, gauges
+from sigmaik.teleop.drill import ROBOTS, drill
+from sigmaik.experiments.methods import ALL_METHODS
+
+
+def until(condition, seconds=20.0):
+    """Waits for it; machines may be busy."""
+    deadline = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < deadline, "it did not happen in time"
+        time.sleep(0.01)
+
+
+def latest(session):
+    session.read()
+    return session.latest
+
+
+@pytest.fixture
+def session():
+    with Session("franka_panda", rate=500.0) as running:
+        until(lambda: latest(running) is not None)
+        yield running
+
+
+def moved(session, dx, dy, dz):
+    pose = latest(session)["pose"].copy()
+    pose[:3, 3] += (dx, dy, dz)
+    return pose
+
+
+# --- commands
+
+
+def test_a_pose_is_followed_and_a_stale_one_stops(session):
+    session.pose_timeout = 0.3
+    target = moved(session, 0.0, 0.3, 0.0)
+    session.follow(target)
+    until(lambda: latest(session)["command"] == sk.LoopCommand.STALE)
+    until(lambda: not latest(session)["qdot"].any())
+    assert latest(session)["status"] == sk.Status.HOLDING
+    session.refresh()  # the one who watches says it again
+    assert session.goal is not None
+    until(lambda: latest(session)["command"] == sk.LoopCommand.POSE)
+    session.pose_timeout = 30.0
+    session.refresh()
+    until(lambda: np.linalg.norm(latest(session)["pose"][:3, 3] - target[:3, 3]) < 1e-3)
+
+
+def test_a_twist_moves_only_while_it_is_said(session):
+    session.start_recording()
+    session.twist([0.1, 0.0, 0.0, 0.0, 0.0, 0.0])
+    until(lambda: latest(session)["command"] == sk.LoopCommand.STALE)
+    until(lambda: not latest(session)["qdot"].any())
+    episode = session.stop_recording()
+    said = episode["command"] == sk.LoopCommand.TWIST
+    assert said.any()
+    assert np.diff(episode["time"][said]).sum() < session.twist_timeout + 0.1
+    session.refresh()  # there is no pose to say again
+    time.sleep(0.05)
+    assert latest(session)["command"] == sk.LoopCommand.STALE
+
+
+def test_refused_commands_leave_all_as_it_is(session):
+    for wrong in (np.eye(3), np.full((4, 4), np.nan), 2.0 * np.eye(4), "here"):
+        with pytest.raises(ValueError):
+            session.follow(wrong)
+    far = np.eye(4)
+    far[0, 3] = 1e3
+    with pytest.raises(ValueError, match="100 m"):
+        session.follow(far)
+    with pytest.raises(ValueError):
+        session.twist([0.0] * 5)
+    assert session.goal is None
+    assert latest(session)["command"] == sk.LoopCommand.HOLD
+
+
+# --- settings
+
+
+def test_settings_change_without_a_kick(session):
+    session.start_recording()
+    session.follow(moved(session, 2.0, 0.0, 0.0))
+    changes = [{"method": name} for name in ALL_METHODS]
+    changes += [{"gamma": 0.3}, {"on_limit": "scale"}, {"mask": (True,) * 3 + (False,) * 3}, {"gain_linear": 15.0}]
+    for change in changes:
+        session.configure(**change)
+        time.sleep(0.08)
+        session.read()
+    episode = session.stop_recording()
+    assert len(np.unique(episode["configuration"])) >= len(changes) / 2
+    assert episode.broken_limits() == {"position": 0, "velocity": 0, "acceleration": 0}
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"method": "magic"}, "unknown method"),
+        ({"gamma": float("nan")}, "gamma"),
+        ({"gamma": 2.0}, "gamma"),
+        ({"gain_linear": -1.0}, "gain_linear"),
+        ({"gain_linear": "fast"}, "gain_linear"),
+        ({"gain_linear": True}, "gain_linear"),
+        ({"on_limit": "break"}, "on_limit"),
+        ({"on_limit": 3}, "on_limit"),
+        ({"limits": "no"}, "limits"),
+        ({"mask": (False,) * 6}, "mask"),
+        ({"mask": (1, 2)}, "mask"),
+        ({"frame": "world"}, "frame"),
+        ({"colour": "red"}, "no setting 'colour'"),
+    ],
+)
+def test_refused_settings_leave_all_as_it_is(session, change, words):
+    before = session.settings
+    with pytest.raises(ValueError, match=words):
+        session.configure(**change)
+    assert session.settings == before
+
+
+@pytest.mark.parametrize("wrong", [{"rate": 0.0}, {"rate": 1e6}, {"acceleration": 0.0}, {"pose_timeout": -1.0}])
+def test_refused_sessions(wrong):
+    with pytest.raises(ValueError, match=next(iter(wrong))):
+        Session("ur10", **wrong)
+
+
+def test_accelerations_that_nobody_gave_are_assumed_and_named():
+    session = Session("ur10", acceleration=7.0)
+    assert session.assumed == session.chain.joint_names
+    np.testing.assert_array_equal(session.chain.limits.acceleration, 7.0)
+    assert Session("franka_panda").assumed == ()
+
+
+# --- recordings
+
+
+@pytest.fixture(scope="module")
+def episode():
+    """A pose, changes under way, a restart, a twist and a rest."""
+    with Session("ufactory_xarm7", rate=500.0) as session:
+        until(lambda: latest(session) is not None)
+        session.follow(moved(session, 0.1, 0.2, 0.1))
+        time.sleep(0.2)
+        session.start_recording()
+        time.sleep(0.2)
+        session.configure(method="dls:damping=0.05", gain_linear=9.0)
+        time.sleep(0.2)
+        session.restart()
+        session.twist([0.1, 0.0, 0.1, 0.3, 0.0, 0.0])
+        time.sleep(0.4)
+        return session.stop_recording()
+
+
+def test_a_recording_has_every_cycle(episode):
+    assert len(episode) > 200
+    assert len(episode.runs) == 2
+    for run in episode.runs:
+        assert (np.diff(episode["cycle"][run]) == 1).all()
+        np.testing.assert_allclose(np.diff(episode["q"][run], axis=0), episode["qdot"][run][1:] * episode.dt, atol=1e-12)
+    assert set(episode["command"]) >= {sk.LoopCommand.POSE, sk.LoopCommand.TWIST, sk.LoopCommand.STALE}
+    assert [s.method for s in episode.settings.values()][0] == "jparse"
+    assert [s.method for s in episode.settings.values()][-1] == "dls:damping=0.05"
+
+
+def test_a_recording_plays_again_to_the_bit(episode, tmp_path):
+    np.testing.assert_array_equal(episode.play(), episode["q"])
+    loaded = Episode.load(episode.save(tmp_path / "e.npz"))
+    assert loaded.samples.dtype == episode.samples.dtype
+    for name in episode.samples.dtype.names:
+        np.testing.assert_array_equal(loaded[name], episode[name])
+    assert dict(loaded.settings) == dict(episode.settings)
+    np.testing.assert_array_equal(loaded.play(), episode["q"])
+    # What was recorded is what plays: another rule gives other positions.
+    other = {number: Settings(method="safety", gain_linear=2.0) for number in loaded.settings}
+    changed = Episode(loaded.samples, loaded.arm, loaded.dt, other, loaded.before)
+    assert np.abs(changed.play() - episode["q"]).max() > 1e-3
+
+
+def test_missing_cycles_are_said(episode):
+    holed = Episode(np.delete(episode.samples, 50), episode.arm, episode.dt, episode.settings, episode.before)
+    assert len(holed.runs) == 3
+    with pytest.raises(ValueError, match="are missing"):
+        holed.play()
+
+
+def test_broken_limits_are_counted(episode):
+    assert sum(episode.broken_limits().values()) == 0
+    samples = episode.samples.copy()
+    samples["q"][10, 0] = 10.0
+    samples["qdot"][20, 1] = 10.0
+    broken = Episode(samples, episode.arm, episode.dt, episode.settings, episode.before).broken_limits()
+    assert broken == {"position": 1, "velocity": 1, "acceleration": 2}
+
+
+def test_parquet_columns(episode, tmp_path):
+    parquet = pytest.importorskip("pyarrow.parquet")
+    table = parquet.read_table(episode.save_parquet(tmp_path / "e.parquet", 7))
+    assert table.num_rows == len(episode)
+    columns = {name: np.array(table[name].to_pylist()) for name in table.column_names}
+    np.testing.assert_allclose(np.diff(columns["timestamp"])[:100], episode.dt)
+    assert columns["timestamp"][0] == 0.0
+    np.testing.assert_array_equal(columns["frame_index"], np.arange(len(episode)))
+    assert set(columns["episode_index"]) == {7}
+    np.testing.assert_allclose(columns["observation.state"], episode["q"], atol=1e-6)
+    np.testing.assert_allclose(columns["observation.velocity"], episode["qdot"], atol=1e-5)
+    np.testing.assert_allclose(columns["action"], episode["asked_twist"], atol=1e-6)
+    np.testing.assert_allclose(columns["pose"].reshape(-1, 4, 4), episode["pose"], atol=1e-6)
+    assert set(columns["status"]) <= {status.name.lower() for status in sk.Status}
+    assert set(columns["command"]) == {"pose", "twist", "stale", "hold"} & set(columns["command"])
+    assert json.loads(table.schema.metadata[b"sigmaik"])["robot"] == "ufactory_xarm7"
+
+
+def test_what_is_no_recording_is_refused(tmp_path):
+    (tmp_path / "text.npz").write_text("not a zip")
+    np.savez(tmp_path / "other.npz", a=np.zeros(3))
+    for name in ("text.npz", "other.npz"):
+        with pytest.raises(ValueError, match="not a recording"):
+            Episode.load(tmp_path / name)
+    with pytest.raises(OSError):
+        Episode.load(tmp_path / "none.npz")
+
+
+def test_recording_has_a_beginning_an_end_and_a_longest():
+    with Session("ur10", rate=500.0, longest_recording=50) as session:
+        with pytest.raises(ValueError, match="not recording"):
+            session.stop_recording()
+        session.start_recording()
+        with pytest.raises(ValueError, match="already"):
+            session.start_recording()
+        until(lambda: (session.read(), session.recording_full)[1])
+        assert len(session.stop_recording()) == 50
+
+
+# --- through singularities
+
+
+def test_every_method_drives_five_arms_through_their_singularities_within_limits():
+    rows = drill(seconds=2.0, rate=250.0)
+    assert {(row.robot, row.method) for row in rows} == {(r, m) for r in ROBOTS for m in ALL_METHODS}
+    for row in rows:
+        assert row.cycles > 100
+        assert row.broken == 0, f"{row.robot} {row.method}: {row.episode.broken_limits()}"
+    for robot in ROBOTS:
+        assert min(row.smallest_ratio for row in rows if row.robot == robot) < 0.02
+
+
+# --- devices
+
+
+class FakePad:
+    axes, buttons = [0.0, -1.0, 0.0, 0.05], [0, 0, 0, 0, 1]
+
+    def __init__(self, _):
+        pass
+
+    def get_instance_id(self):
+        return 3
+
+    def get_name(self):
+        return "fake"
+
+    def get_numaxes(self):
+        return len(self.axes)
+
+    def get_numbuttons(self):
+        return len(self.buttons)
+
+    def get_axis(self, i):
+        return self.axes[i]
+
+    def get_button(self, i):
+        return self.buttons[i]
+
+
+def fake_pygame(monkeypatch, pads, events=()):
+    nothing = types.SimpleNamespace(init=lambda: None, quit=lambda: None)
+    module = types.ModuleType("pygame")
+    module.display = nothing
+    module.joystick = types.SimpleNamespace(
+        init=lambda: None, quit=lambda: None, get_count=lambda: pads, Joystick=FakePad
+    )
+    module.event = types.SimpleNamespace(get=lambda: list(events))
+    module.JOYDEVICEREMOVED = 1
+    monkeypatch.setitem(sys.modules, "pygame", module)
+    monkeypatch.setattr(devices, "need", lambda *_: None)
+
+
+def test_a_gamepad(monkeypatch):
+    fake_pygame(monkeypatch, 1)
+    pad = devices.open_device("gamepad")
+    reading = pad.read()
+    assert pad.name == "gamepad fake"
+    assert reading.held
+    np.testing.assert_array_equal(reading.twist, [1.0, 0.0, 0.0, 0.0, 0.0, 0.0])  # ahead; the dead zone swallows the rest
+
+
+def test_a_gamepad_that_is_not_there_or_goes_away(monkeypatch):
+    fake_pygame(monkeypatch, 0)
+    with pytest.raises(devices.DeviceError, match="no gamepad"):
+        devices.open_device("gamepad")
+    fake_pygame(monkeypatch, 1, [types.SimpleNamespace(type=1, instance_id=3)])
+    pad = devices.open_device("gamepad")
+    with pytest.raises(devices.DeviceError, match="gone"):
+        pad.read()
+
+
+def test_a_spacemouse(monkeypatch):
+    state = types.SimpleNamespace(x=0.0, y=1.0, z=0.5, roll=0.0, pitch=0.0, yaw=-2.0, buttons=[1, 0])
+    mouse = types.SimpleNamespace(name="fake", read=lambda: state, close=lambda: None)
+    module = types.ModuleType("pyspacemouse")
+    module.open = lambda: mouse
+    monkeypatch.setitem(sys.modules, "pyspacemouse", module)
+    monkeypatch.setattr(devices, "need", lambda *_: None)
+    reading = devices.open_device("spacemouse").read()
+    assert reading.held
+    np.testing.assert_allclose(reading.twist, [1.0, 0.0, 0.5, 0.0, 0.0, 1.0])
+
+    def absent():
+        raise RuntimeError("no device")
+
+    module.open = absent
+    with pytest.raises(devices.DeviceError, match="no device"):
+        devices.open_device("spacemouse")
+
+
+def test_unknown_devices_and_missing_packages():
+    with pytest.raises(ValueError, match="gamepad, spacemouse"):
+        devices.open_device("theremin")
+
+
+# --- what is drawn
+
+
+def test_gauges_say_what_a_sample_says(session):
+    session.twist([0.1, 0.0, 0.0, 0.0, 0.0, 0.0])
+    until(lambda: latest(session)["command"] == sk.LoopCommand.TWIST)
+    sample = session.latest
+    text = gauges.status_text(sample, session.chain, "J-<PARSE>", session.statistics, session.rate)
+    assert "0.100 m/s" in text
+    assert "data-command='TWIST'" in text
+    assert "J-&lt;PARSE&gt;" in text
+    bars = gauges.singular_bars(np.array([2.0, 1.0, 0.1]), 0.1)
+    assert bars.count("σ") == 4
+    assert "= 0.200" in bars
+    joints = gauges.joint_bars(sample["q"], sample["qdot"], session.chain, 0b100)
+    assert joints.count("<span") == 2 * 7
+
+
+def test_links_without_meshes_get_shapes():
+    from sigmaik.teleop.drawing import drawable
+
+    text = """<robot name="r">
+      <link name="a"><visual><geometry><mesh filename="package://none/a.stl"/></geometry></visual></link>
+      <link name="b"><visual><geometry><mesh filename="b.stl"/></geometry></visual>
+        <collision><geometry><box size="1 1 1"/></geometry></collision></link>
+      <link name="c"><visual><geometry><sphere radius="0.1"/></geometry></visual></link>
+      <joint name="j" type="revolute"><parent link="a"/><child link="b"/><origin xyz="0.3 0 0.4"/></joint>
+      <joint name="k" type="fixed"><parent link="b"/><child link="c"/></joint>
+    </robot>"""
+    drawn, missing = drawable(text, lambda name: name)
+    assert missing == ["package://none/a.stl", "b.stl"]
+    assert drawn.count("<cylinder") == 1
+    assert 'length="0.5"' in drawn
+    assert drawn.count("<box") == 2
+    assert "mesh" not in drawn
+
+
+def test_the_pages_target_is_checked():
+    pytest.importorskip("viser")
+    from sigmaik.teleop.scene import pose_of, singular_directions
+
+    np.testing.assert_allclose(pose_of((1.0, 2.0, 3.0), (1.0, 0.0, 0.0, 0.0))[:3, 3], (1.0, 2.0, 3.0))
+    for position, wxyz in (((1.0, np.nan, 0.0), (1, 0, 0, 0)), ((0, 0, 0), (0, 0, 0, 0)), ((0, 0), (1, 0, 0, 0))):
+        with pytest.raises(ValueError, match="page's target"):
+            pose_of(position, wxyz)
+    arm = sk.robots.load("franka_panda")
+    q = np.zeros(7)  # stretched out
+    linear, angular, sigma = singular_directions(arm.jacobian(q), 0.1, 1.0)
+    assert len(linear) == len(angular) == (sigma <= 0.1 * sigma[0]).sum() >= 1
+    for parts in zip(linear, angular, strict=True):
+        assert np.linalg.norm(np.concatenate(parts) @ arm.jacobian(q)) < 0.1 * sigma[0]
+
+
+# --- the command
+
+
+def test_wrong_options(capsys, tmp_path):
+    for arguments in (
+        ["--robot", "nobody"],
+        ["--port", "70000"],
+        ["--rate", "0"],
+        ["--method", "magic"],
+        ["--gamma", "-1"],
+        ["--for", "0"],
+        ["--replay", str(tmp_path / "none.npz")],
+    ):
+        assert main(["teleop", *arguments]) == 2
+        assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_the_page_starts_and_ends(capsys, tmp_path):
+    pytest.importorskip("viser")
+    assert main(["teleop", "--robot", "puma560", "--port", "0", "--for", "0.5", "--out", str(tmp_path)]) == 0
+    out = capsys.readouterr().out
+    assert "http://127.0.0.1:" in out
+    assert "drives puma560" in out
