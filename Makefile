@@ -10,7 +10,7 @@ export SKBUILD_BUILD_DIR := build/python
 export SKBUILD_CMAKE_DEFINE := SIGMAIK_WERROR=$(WERROR)
 
 .NOTPARALLEL:
-.PHONY: help demo test stress bench wheel build install stubs stubs-check clean system
+.PHONY: help demo test test-browser stress bench wheel build install stubs stubs-check clean system
 
 help:  ## this list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1  /p' Makefile | awk '{printf "  %s %-12s", $$1, $$2; $$1=$$2=""; print}'
@@ -24,6 +24,11 @@ test: build .venv/.test .venv/.package  ## everything: install, stubs, types, C+
 	$(BIN)/mypy
 	ctest --test-dir build/release --output-on-failure
 	$(BIN)/python -m pytest
+	$(MAKE) test-browser
+
+test-browser: .venv/.test .venv/.package  ## the page of `sigmaik teleop` in Chromium, without a screen (part of `make test`)
+	@tools/setup_system.sh $(PYTHON) chromium
+	$(BIN)/python -m pytest tests/browser
 
 stress: build/release/build.ninja  ## ten million random cycles into every limit: counts of what broke, which is nothing
 	cmake --build build/release --target sigmaik_stress

@@ -1,8 +1,10 @@
 #!/usr/bin/env bash
-# Installs the Debian or Ubuntu packages that the build needs and that are missing: setup_system.sh [PYTHON].
+# Installs the Debian or Ubuntu packages that the build needs and that are missing: setup_system.sh [PYTHON [COMMAND…]].
+# The commands are needed, too, from packages of the same name.
 # Says nothing where all is there.
 set -euo pipefail
 python=${1:-python3}
+shift || true
 
 need() { command -v "$1" >/dev/null || missing+=("${2:-$1}"); }
 missing=()
@@ -11,6 +13,7 @@ need g++
 need cmake
 need ninja ninja-build
 need ccache
+for command in "$@"; do need "$command"; done
 
 libraries=(libeigen3-dev liborocos-kdl-dev liburdfdom-dev libconsole-bridge-dev libtinyxml2-dev
            doctest-dev libbenchmark-dev)

@@ -1,0 +1,98 @@
+"""A page, and a browser that looks at it: Debian's Chromium without a screen, driven by Playwright."""
+
+import os
+import shutil
+
+import pytest
+
+from sigmaik.teleop import Session
+from sigmaik.teleop.page import Page
+
+# No graphics card, no sandbox for root, and nothing that it would ask of the network.
+FLAGS = [
+    "--no-sandbox",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--ignore-gpu-blocklist",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
+#: [s] machines are busy, and draw without a graphics card
+PATIENCE = 60.0
+
+
+@pytest.fixture(scope="session")
+def browser():
+    from playwright.sync_api import sync_playwright
+
+    path = os.environ.get("SIGMAIK_BROWSER") or shutil.which("chromium") or shutil.which("chromium-browser")
+    assert path, "no Chromium: Debian's package chromium has it"
+    with sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(executable_path=path, args=FLAGS)
+        yield chromium
+        chromium.close()
+
+
+class Driven:
+    """A page in a browser, and the session behind it."""
+
+    def __init__(self, session, server, tab):
+        self.session, self.server, self.tab = session, server, tab
+        self.errors = []
+        tab.set_default_timeout(1e3 * PATIENCE)
+        tab.on("pageerror", lambda error: self.errors.append(str(error)))
+        tab.on("console", lambda m: self.errors.append(m.text) if m.type == "error" else None)
+        tab.goto(server.url)
+        tab.wait_for_selector("#sk-status")
+
+    def wait(self, condition, what):
+        """Waits for a condition of the session, with the browser alive."""
+        for _ in range(int(PATIENCE / 0.1)):
+            if condition():
+                return
+            self.tab.wait_for_timeout(100)
+        raise AssertionError(f"not in time: {what}")
+
+    def control(self, label):
+        """The control beside a label."""
+        return self.tab.locator(f"xpath=//label[normalize-space(text())='{label}']/ancestor::div[3]//input")
+
+    def go_to(self, x, y, z):
+        """Types a target."""
+        for box, value in enumerate((x, y, z)):
+            self.control("target [m]").nth(box).fill(f"{value:.3f}")
+            self.control("target [m]").nth(box).press("Enter")
+
+    def choose(self, label, option):
+        """Takes an option of a dropdown."""
+        self.control(label).first.click()
+        self.tab.get_by_role("option", name=option, exact=True).click()
+
+    def press(self, name):
+        self.tab.get_by_role("button", name=name, exact=True).click()
+
+    def status(self, attribute="status"):
+        return self.tab.locator("#sk-status").get_attribute(f"data-{attribute}")
+
+
+@pytest.fixture
+def drive(browser, tmp_path):
+    """drive(robot): a session, its page, and a tab that shows it."""
+    opened = []
+
+    def drive(robot="ufactory_xarm7", **options):
+        session = Session(robot, pose_timeout=10.0, **options)
+        session.__enter__()
+        server = Page(session, port=0, directory=tmp_path)
+        tab = browser.new_page(viewport={"width": 1400, "height": 1000})
+        opened.append((session, server, tab))
+        return Driven(session, server, tab)
+
+    yield drive
+    for session, server, tab in opened:
+        tab.close()
+        server.close()
+        session.__exit__()
