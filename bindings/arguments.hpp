@@ -131,6 +131,7 @@ void bind_chain(py::module_& m);
 void bind_methods(py::module_& m);
 void bind_solver(py::module_& m);
 void bind_servo(py::module_& m);
+void bind_target_stream(py::module_& m);
 void bind_dynamics(py::module_& m);
 void bind_least_squares(py::module_& m);
 void bind_constrained_ik(py::module_& m);

@@ -51,6 +51,7 @@ PYBIND11_MODULE(_core, m) {
   bind_methods(m);
   bind_solver(m);
   bind_servo(m);
+  bind_target_stream(m);
   bind_dynamics(m);
   bind_least_squares(m);
   bind_constrained_ik(m);

@@ -20,6 +20,7 @@
 ///     singularities.hpp    SingularSets: known singular sets of three arms, potentials, manipulability in closed form
 ///     avoidance.hpp        Avoidance: a posture velocity away from singularities
 ///     servo.hpp            Servo: pose or twist in, joint command out, each cycle
+///     target_stream.hpp    TargetStream: samples of a moving pose in, a smooth target out, each cycle
 ///     analytic_ik.hpp      AnalyticIk: every posture of a pose, for six joints with a spherical wrist
 ///     dynamics.hpp         Dynamics: mass matrix, Coriolis, gravity, by KDL (not included)
 ///     constrained_ik.hpp   ConstrainedIk: a pose exactly in part, the rest as limits allow; time scaling (not included)
@@ -48,6 +49,7 @@
 #include <sigmaik/singularities.hpp>
 #include <sigmaik/spectrum.hpp>
 #include <sigmaik/status.hpp>
+#include <sigmaik/target_stream.hpp>
 #include <sigmaik/task.hpp>
 #include <sigmaik/types.hpp>
 #include <sigmaik/velocity_solver.hpp>
