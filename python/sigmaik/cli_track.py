@@ -123,10 +123,11 @@ def _track(arguments: argparse.Namespace) -> int:
     from .experiments.track_table import error_table, event_table, headline, motion_table
 
     console.print(headline(experiment), highlight=False)
-    for title, chosen in (("rules", by_method), ("modes", by_mode)):
-        for table in (error_table, motion_table):
-            console.print()
-            console.print(table([rows[v] for v in chosen], title))
+    for table in (error_table, motion_table):
+        console.print()
+        console.print(table([rows[v] for v in by_method], "method"))
+        console.print()
+        console.print(table([rows[v] for v in by_mode], "mode"))
     console.print()
     console.print(event_table([rows[v] for v in by_mode]))
 

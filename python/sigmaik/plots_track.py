@@ -94,12 +94,15 @@ def event_figure(runs: Sequence[Follow]) -> Figure:
     figure = Figure(figsize=(10.0, 5.4), layout="constrained")
     FigureCanvasAgg(figure)
     wrong = [f for f in e.frames if f.outlier]
-    # The wrong sample that is farthest off while the target is within reach.
-    offs = [float(np.linalg.norm(f.pose[:3, 3] - e.poses[_cycle(runs[0], f.stamp), :3, 3])) for f in wrong]
-    inside = [o if e.judged[_cycle(runs[0], f.stamp)] and e.reachable[_cycle(runs[0], f.stamp)] else 0.0 for o, f in zip(offs, wrong, strict=True)]
+    # Of the wrong samples that come while all else is well, the one that is farthest off.
+    offs = []
+    for f in wrong:
+        k = _cycle(runs[0], f.stamp)
+        well = e.judged[k] and e.reachable[k] and not e.gap[0] - 1.2 < f.stamp < e.gap[1]
+        offs.append(float(np.linalg.norm(f.pose[:3, 3] - e.poses[k, :3, 3])) if well else 0.0)
     windows = []
     if wrong:
-        stamp = wrong[int(np.argmax(inside))].stamp
+        stamp = wrong[int(np.argmax(offs))].stamp
         windows.append(("a wrong sample", stamp - 0.4, stamp + 1.2))
     if e.gap[1] > e.gap[0]:
         windows.append(("the stream stops, and goes on", e.gap[0] - 0.5, min(e.t[-1], e.gap[1] + 1.5)))
@@ -110,7 +113,7 @@ def event_figure(runs: Sequence[Follow]) -> Figure:
         # The coordinate that shows most: the target's, or the wrong sample's.
         shown = np.ptp(e.poses[part, :3, 3], axis=0)
         if title.startswith("a wrong"):
-            frame = wrong[int(np.argmax(inside))]
+            frame = wrong[int(np.argmax(offs))]
             shown = np.abs(frame.pose[:3, 3] - e.poses[_cycle(runs[0], frame.stamp), :3, 3])
         axis = int(np.argmax(shown))
         panel.plot(e.t[part], e.poses[part, axis, 3], color="#777777", linewidth=4.0, alpha=0.45, label="target")

@@ -68,7 +68,7 @@ BEYOND = 0.15  #: [m] out of reach
 START = 1.0  #: [s] that are not judged: the servo's soft start
 #: [s] that are not judged after the gap, and after the target was out of reach: the way back to it.
 RETURN = 2.0
-BACK = 0.02  #: [m]: so near, or as near as 95 % of the time, the tip is back
+BACK = 0.1  #: [m]: so near the tip is back, whatever its lag
 #: Within reach is what a servo without limits of speed comes this close to [m, rad].
 NEAR = (2e-3, 1e-2)
 #: Beyond a limit by less, of the limit, is rounding: that of finite differences.
@@ -322,7 +322,7 @@ def _scripted(target: str, chain: sk.Chain, home: Array, t: Array, seed: int) ->
     duration = float(t[-1])
     # Whole rounds of about 5 s, up to speed in the first second and down in the last.
     ramp = np.clip(np.minimum(t, duration - t), 0.0, 1.0)
-    pace = np.cumsum(ramp * ramp * (3.0 - 2.0 * ramp))
+    pace = np.cumsum(_step(ramp))
     turn = 2.0 * math.pi * max(1, round(duration / 5.0)) * (pace - pace[0]) / (pace[-1] - pace[0])
     rng = np.random.default_rng([seed, 1])
     excursion = _excursion(chain, home, outward)
@@ -336,16 +336,22 @@ def _scripted(target: str, chain: sk.Chain, home: Array, t: Array, seed: int) ->
         # sin⁴: out for a tenth of the way's time, at rest at the ends.
         out[:, :3, 3] += np.outer(excursion * np.sin(0.5 * turn / max(1, round(duration / 10.0))) ** 2, outward)
     else:
-        hand = _wander(rng, t, 6) * ramp[:, None]
+        hand = _wander(rng, t, 6) * _step(ramp)[:, None]
         out[:, :3, 3] += 0.05 * (hand[:, :1] * outward + hand[:, 1:2] * across + hand[:, 2:3] * up)
         # Out of reach and back between a quarter and six tenths of the time: 2 s out, a stay, 2 s back.
         begin, end = 0.25 * duration, 0.6 * duration
         way = min(2.5, 0.4 * (end - begin))
         u = np.clip(np.minimum(t - begin, end - t) / way, 0.0, 1.0)
-        out[:, :3, 3] += np.outer(excursion * u**3 * (10.0 - 15.0 * u + 6.0 * u * u), outward)
+        out[:, :3, 3] += np.outer(excursion * _step(u), outward)
         for k in range(len(t)):
             out[k, :3, :3] = sk.rotation_exp(0.12 * hand[k, 3:]) @ pose[:3, :3]
     return out
+
+
+def _step(u: Array) -> Array:
+    """From 0 to 1 with no speed and no acceleration at both ends."""
+    step: Array = u**3 * (10.0 - 15.0 * u + 6.0 * u * u)
+    return step
 
 
 def _wander(rng: np.random.Generator, t: Array, columns: int) -> Array:
@@ -569,7 +575,7 @@ def summarize_track(run: Follow, without: Follow | None = None) -> TrackSummary:
         orientation_max=_largest(orientation[inside]),
         outside_mean=_mean(position[outside]),
         outside_max=_largest(position[outside]),
-        return_time=_return_time(run, _quantile(position[inside])),
+        return_time=_return_time(run),
         delay=_delay(run),
         tip_jerk_rms=float(np.sqrt(np.mean(run.tip_jerk**2))),
         tip_jerk_max=float(run.tip_jerk.max()),
@@ -612,23 +618,23 @@ def _delay(run: Follow) -> float:
     best = int(np.argmax(likeness))
     if not 0 < best < len(lags) - 1 or likeness[best] <= 0.0:
         return math.nan
-    before, at, after = likeness[best - 1 : best + 2]
+    before, at, after = (float(x) for x in likeness[best - 1 : best + 2])
     bend = before - 2.0 * at + after
     offset = 0.5 * (before - after) / bend if bend < 0.0 else 0.0
-    return float((lags[best] + offset) * stride / rate)
+    return (float(lags[best]) + offset) * stride / rate
 
 
-def _return_time(run: Follow, near: float) -> float:
+def _return_time(run: Follow) -> float:
     e = run.experiment
     error, rate = run.position_error, e.settings.rate
-    times = []
+    times = [math.nan]
     for k in e.back:
         # Until it leaves again, or the stream stops, 5 s at most.
         until = next((j for j in range(k, min(len(error), k + round(5.0 * rate))) if not e.reachable[j] or j == round(e.gap[0] * rate)), None)
         part = error[k : k + round(5.0 * rate) if until is None else until]
-        away = np.flatnonzero(part > max(BACK, near))
-        times.append((away[-1] + 1) / rate if len(away) else 0.0)
-    return float(max(times, default=math.nan))
+        away = np.flatnonzero(part > BACK)
+        times.append((int(away[-1]) + 1) / rate if len(away) else 0.0)
+    return float(np.nanmax(times)) if len(times) > 1 else math.nan
 
 
 def _drift(run: Follow) -> float:
