@@ -132,6 +132,7 @@ void bind_methods(py::module_& m);
 void bind_solver(py::module_& m);
 void bind_servo(py::module_& m);
 void bind_servo_loop(py::module_& m);
+void bind_target_stream(py::module_& m);
 void bind_dynamics(py::module_& m);
 void bind_least_squares(py::module_& m);
 void bind_constrained_ik(py::module_& m);

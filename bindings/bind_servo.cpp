@@ -135,12 +135,16 @@ void bind_servo(py::module_& m) {
           "qdot: (n,) how the arm moves now, from which the command is faded; None: it stands.")
       .def(
           "update",
-          [](Servo& s, const py::object& target) {
+          [](Servo& s, const py::object& target, const MaybeArray& feedforward) {
             require_started(s);
-            return checked(s.update(pose_argument(target, "target")));
+            const Pose pose = pose_argument(target, "target");
+            const Twist twist = feedforward ? twist_argument(*feedforward, "feedforward") : Twist(Twist::Zero());
+            return checked(s.update(pose, twist));
           },
-          py::arg("target"),
+          py::arg("target"), py::arg("feedforward") = py::none(),
           "One cycle towards a pose (4, 4) of the tip in the base.\n\n"
+          "feedforward: (6,) twist [v; ω] of a target that moves, base axes, at its origin, added to gain × error. Behind\n"
+          "    a target of constant twist the tip lags by speed/gain without it, and not at all with it.\n"
           "Raises Error, and holds, where the target is not a pose.")
       .def(
           "update_twist",

@@ -52,6 +52,7 @@ PYBIND11_MODULE(_core, m) {
   bind_solver(m);
   bind_servo(m);
   bind_servo_loop(m);
+  bind_target_stream(m);
   bind_dynamics(m);
   bind_least_squares(m);
   bind_constrained_ik(m);

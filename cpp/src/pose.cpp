@@ -34,6 +34,27 @@ Eigen::Matrix3d rotation_exp(const Eigen::Vector3d& vector) noexcept {
   return Eigen::AngleAxisd(angle, vector / angle).toRotationMatrix();
 }
 
+Eigen::Vector3d rotation_exp_rate(const Eigen::Vector3d& vector, const Eigen::Vector3d& rate) noexcept {
+  const double square = vector.squaredNorm(), angle = std::sqrt(square);
+  // Below, the next term of each series is less than rounding, and the quotients begin to lose digits.
+  const bool small = angle < 1e-2;
+  const double sine = std::sin(0.5 * angle);
+  const double a = small ? 0.5 - square / 24.0 + square * square / 720.0 : 2.0 * sine * sine / square;
+  const double b =
+      small ? 1.0 / 6.0 - square / 120.0 + square * square / 5040.0 : (angle - std::sin(angle)) / (square * angle);
+  const Eigen::Vector3d once = vector.cross(rate);
+  return rate + a * once + b * vector.cross(once);
+}
+
+Eigen::Vector3d rotation_log_rate(const Eigen::Vector3d& vector, const Eigen::Vector3d& omega) noexcept {
+  // J⁻¹ = I − ½ [φ]× + (1 − (θ/2) cot(θ/2))/θ² [φ]×²
+  const double square = vector.squaredNorm(), half = 0.5 * std::sqrt(square);
+  const double b = half < 1e-2 ? 1.0 / 12.0 + square / 720.0 + square * square / 30240.0
+                               : (1.0 - half / std::tan(half)) / square;
+  const Eigen::Vector3d once = vector.cross(omega);
+  return omega - 0.5 * once + b * vector.cross(once);
+}
+
 Twist pose_error(const Pose& current, const Pose& target) noexcept {
   Twist error;
   error.head<3>() = target.translation() - current.translation();

@@ -36,11 +36,6 @@ void check_joints(const char* what, const JointRef& values, const Chain& chain) 
   }
 }
 
-void shorten(Eigen::Ref<Eigen::Vector3d> vector, double longest) noexcept {
-  const double length = detail::length(vector);
-  if (length > longest) vector *= longest / length;
-}
-
 // Below this part of σ_max the rule treats a direction as singular.
 double threshold(const Method& method) noexcept {
   return std::visit(
@@ -191,14 +186,15 @@ ServoStep Servo::stop(Status status) noexcept {
   return step;
 }
 
-ServoStep Servo::update(const Pose& target) noexcept {
-  if (!is_pose(target.matrix())) return stop(Status::BadInput);
+ServoStep Servo::update(const Pose& target, const Twist& feedforward) noexcept {
+  if (!is_pose(target.matrix()) || !detail::finite(feedforward)) return stop(Status::BadInput);
   const Twist error = pose_error(state_.tip, target);
   Twist twist = error;
-  shorten(twist.head<3>(), options_.max_linear_error);
-  shorten(twist.tail<3>(), options_.max_angular_error);
+  detail::shorten(twist.head<3>(), options_.max_linear_error);
+  detail::shorten(twist.tail<3>(), options_.max_angular_error);
   twist.head<3>() *= options_.gain_linear;
   twist.tail<3>() *= options_.gain_angular;
+  twist += feedforward;
   ServoStep step = resolve(twist, true);
   step.pose_error = error;
   return step;

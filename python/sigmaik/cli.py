@@ -1,5 +1,5 @@
-"""The command `sigmaik`: reach, limits, axis5, montecarlo, reaching, table and cart
-(experiments), teleop, robots, info.
+"""The command `sigmaik`: experiments (reach, limits, axis5, montecarlo, reaching, table, cart, track, execute), teleop,
+robots and info.
 
 Everything that is asked of a file or an option and is wrong there ends with one line on stderr and exit code
 2.
@@ -27,6 +27,7 @@ from .cli_montecarlo import add_montecarlo
 from .cli_reaching import add_reaching
 from .cli_table import add_table
 from .cli_teleop import add_teleop
+from .cli_track import add_track
 from .console import MissingPackage, need, terminal
 from .experiments import axis5
 from .experiments.reach import load_arm
@@ -74,6 +75,7 @@ def _parser() -> argparse.ArgumentParser:
     add_reaching(commands.add_parser("reaching", help="motions along a good geometry-aware index, and others"))
     add_cart(commands.add_parser("cart", help="an arm on a cart by its shoulder singularity: four ways to drive the cart"))
     add_teleop(commands.add_parser("teleop", help="drive an arm from a page in the browser, through its singularities"))
+    add_track(commands.add_parser("track", help="a target that moves, seen by a camera: errors, delay, jerk, events"))
     robots = commands.add_parser("robots", help="list the arms that are shipped, and their paths")
     robots.set_defaults(run=_robots)
     _add_info(commands.add_parser("info", help="an arm's joints, limits, reach and singular values"))

@@ -22,9 +22,10 @@ from .experiments.storage import write_atomically
 
 if TYPE_CHECKING:
     from .experiments.limits import Trace
+    from .experiments.methods import NamedMethod
     from .experiments.reach import Run
 
-__all__ = ["experiment_figure", "limits_figure", "save_figure"]
+__all__ = ["experiment_figure", "limits_figure", "method_colour", "save_figure"]
 
 Array = NDArray[np.float64]
 
@@ -271,6 +272,11 @@ def save_figure(figure: Figure, file: str | pathlib.Path, dpi: int = 110) -> pat
 
 def _layer(run: Run) -> tuple[bool, bool]:
     return run.method.family == "jparse", run.method.family != "pinv"
+
+
+def method_colour(method: NamedMethod) -> str:
+    """A colour a family, the same in all figures."""
+    return _COLOURS.get(method.family, "black")
 
 
 def _styles(runs: Sequence[Run]) -> dict[str, tuple[str, object]]:

@@ -144,6 +144,20 @@ TEST_CASE("exponential of several turns and of subnormal vectors is a rotation")
   CHECK(sigmaik::rotation_exp(Vector3d::Zero()) == Matrix3d::Identity());
 }
 
+TEST_CASE("rates: of a rotation from that of its vector, against differences, and back") {
+  Random random(9);
+  for (int i = 0; i < 5000; ++i) {
+    const double angle = i % 3 == 0 ? random.decades(-12.0, -1.0) : random.uniform(0.0, 6.0);
+    const Vector3d vector = angle * random.unit(3), rate = random.vector(3);
+    CAPTURE(vector.transpose());
+    const Vector3d omega = sigmaik::rotation_exp_rate(vector, rate);
+    const double h = 1e-5;
+    const Matrix3d ahead = sigmaik::rotation_exp(vector + h * rate), behind = sigmaik::rotation_exp(vector - h * rate);
+    CHECK((sigmaik::rotation_log(ahead * behind.transpose()) / (2.0 * h) - omega).norm() < 1e-9 * (1.0 + rate.norm()));
+    CHECK((sigmaik::rotation_log_rate(vector, omega) - rate).norm() < 1e-11 * (1.0 + rate.norm()));
+  }
+}
+
 TEST_CASE("pose error takes the one pose to the other") {
   Random random(7);
   for (int i = 0; i < 3000; ++i) {

@@ -175,6 +175,27 @@ TEST_CASE("closed forms and torque limits in constrained inverse kinematics pass
   }
 }
 
+TEST_CASE("streams of samples pass Eigen's checks") {
+  test::Random random(12);
+  for (const auto mode : {sigmaik::StreamMode::Hold, sigmaik::StreamMode::Interpolate, sigmaik::StreamMode::Predict}) {
+    sigmaik::TargetStreamOptions options;
+    options.mode = mode;
+    sigmaik::TargetStream stream(options);
+    sigmaik::Pose pose = random.pose(), wrong = random.pose(9.0);
+    double sum = 0.0;
+    {
+      const NoMalloc none;
+      for (int cycle = 0; cycle < 2000; ++cycle) {
+        pose.translation()[0] += 1e-4;
+        if (cycle % 25 == 0) stream.push(1e-3 * cycle, pose);
+        if (cycle % 40 == 7) stream.push(1e-3 * cycle, wrong);
+        sum += stream.at(1e-3 * cycle).twist.sum();
+      }
+    }
+    CHECK(std::isfinite(sum));
+  }
+}
+
 TEST_CASE("costs of collisions of every size pass Eigen's checks") {
   using namespace sigmaik::planning;
   test::Random random(11);

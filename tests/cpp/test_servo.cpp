@@ -907,6 +907,76 @@ TEST_CASE("an arm of another size under the same servo moves the same") {
   }
 }
 
+TEST_CASE("feed-forward: behind a moving target the error is of the order of dt, not speed/gain") {
+  // A target T(t) = exp(t ω) about a place that drifts, fed forward: e' = −g e + O(dt) in the loop, so e → O(dt).
+  Random random(31);
+  for (const auto& [name, chain] : arms()) {
+    CAPTURE(name);
+    if (chain.dof() < 6) continue;
+    const JointVector start = regular_configuration(random, chain, 0.1);
+    const Pose home = pose(chain, start);
+    const Eigen::Vector3d v = 0.05 * random.unit(3), omega = 0.1 * random.unit(3);
+    double error[2][2];
+    for (const bool fed : {false, true}) {
+      for (const int fine : {0, 1}) {
+        ServoOptions options = free_options();
+        options.dt = fine == 0 ? 2e-3 : 1e-3;
+        options.soft_start = 0.0;
+        Servo servo(chain, PseudoInverse{}, options);
+        servo.reset(start);
+        Twist twist;
+        twist << v, omega;
+        ServoStep step;
+        const int cycles = static_cast<int>(std::lround(1.2 / options.dt));
+        for (int k = 0; k < cycles; ++k) {
+          Pose target = home;
+          target.translation() += k * options.dt * v;
+          target.linear() = rotation_exp(k * options.dt * omega) * home.linear();
+          step = fed ? servo.update(target, twist) : servo.update(target);
+        }
+        error[fed][fine] = step.pose_error.norm();
+      }
+    }
+    const double lag = std::hypot(v.norm(), omega.norm()) / ServoOptions{}.gain_linear;
+    CHECK(error[0][1] == doctest::Approx(lag).epsilon(0.05));
+    CHECK(error[1][1] < 0.02 * lag);
+    CHECK(error[1][1] < 0.6 * error[1][0]);  // halves with dt
+  }
+}
+
+TEST_CASE("feed-forward: zero is none, it is added after the caps, limits are held, and what is not finite is refused") {
+  Random random(32);
+  for (const auto& [name, chain] : arms()) {
+    CAPTURE(name);
+    const JointVector start = regular_configuration(random, chain);
+    Pose far = pose(chain, start);
+    far.translation() += Eigen::Vector3d(3.0, 0.0, 0.0);
+    Servo a(chain, JParse{}, free_options()), b(chain, JParse{}, free_options()), held(chain, JParse{});
+    for (Servo* servo : {&a, &b, &held}) servo->reset(start);
+    const Twist twist = random.vector(6);
+    JointVector before = start;
+    for (int cycle = 0; cycle < 200; ++cycle) {
+      CHECK(same(a.update(far), b.update(far, Twist::Zero())));
+      const ServoStep step = held.update(far, 10.0 * twist);
+      check_step(chain, step, before, ServoOptions{});
+      before = step.q;
+    }
+    ServoOptions options = free_options();
+    options.soft_start = 0.0;
+    Servo by_pose(chain, JParse{}, options), by_twist(chain, JParse{}, options);
+    by_pose.reset(start);
+    by_twist.reset(start);
+    Twist sum = twist;
+    sum[0] += options.gain_linear * options.max_linear_error;
+    CHECK((by_pose.update(far, twist).qdot - by_twist.update_twist(sum).qdot).norm() < 1e-9 * sum.norm());
+    for (const double bad : {kNan, kInfinity}) {
+      Twist wrong = twist;
+      wrong[random.integer(0, 5)] = bad;
+      CHECK(held.update(far, wrong).status == Status::BadInput);
+    }
+  }
+}
+
 #ifdef SIGMAIK_TEST_HEAP
 TEST_CASE("update() and update_twist() leave the heap alone, whatever they are given") {
   Random random(23);

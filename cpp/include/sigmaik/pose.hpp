@@ -13,6 +13,13 @@ Eigen::Vector3d rotation_log(const Eigen::Matrix3d& rotation) noexcept;
 /// Rotation about `vector` by its length [rad] (Rodrigues).
 Eigen::Matrix3d rotation_exp(const Eigen::Vector3d& vector) noexcept;
 
+/// Angular velocity ω, base axes, of exp(φ(t)) whose vector φ changes at `rate`: ω = J φ̇ with SO(3)'s left Jacobian
+/// J = I + (1 − cos θ)/θ² [φ]× + (θ − sin θ)/θ³ [φ]×², θ = |φ|.
+Eigen::Vector3d rotation_exp_rate(const Eigen::Vector3d& vector, const Eigen::Vector3d& rate) noexcept;
+
+/// The rate φ̇ of `vector` at which exp(φ) turns at ω, base axes: the inverse of rotation_exp_rate, for |φ| < 2π.
+Eigen::Vector3d rotation_log_rate(const Eigen::Vector3d& vector, const Eigen::Vector3d& omega) noexcept;
+
 /// [e_p; e_o] that takes `current` to `target`: e_p [m] the difference of the origins, e_o [rad] the
 /// axis-angle vector of R_target R_currentᵀ; both in base axes.
 Twist pose_error(const Pose& current, const Pose& target) noexcept;

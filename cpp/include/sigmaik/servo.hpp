@@ -91,7 +91,9 @@ class Servo {
 
   /// One cycle towards a pose of the tip in base. Real time. A target that is not a pose is refused: BadInput, and the
   /// arm stops.
-  ServoStep update(const Pose& target) noexcept;
+  /// \param feedforward twist [v; ω] of a target that moves, base axes, at its origin; added to gain × error, after the
+  ///     error's caps. Behind a target of constant twist the tip lags by speed/gain without it, and not at all with it.
+  ServoStep update(const Pose& target, const Twist& feedforward = Twist::Zero()) noexcept;
 
   /// One cycle along a twist [v; ω], base axes, at the tip's origin. Real time.
   ServoStep update_twist(const Twist& twist) noexcept;

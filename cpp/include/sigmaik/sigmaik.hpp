@@ -21,6 +21,7 @@
 ///     avoidance.hpp        Avoidance: a posture velocity away from singularities
 ///     servo.hpp            Servo: pose or twist in, joint command out, each cycle
 ///     servo_loop.hpp       ServoLoop: a servo in a thread of its own; stale commands stop the arm (not included)
+///     target_stream.hpp    TargetStream: samples of a moving pose in, a smooth target out, each cycle
 ///     analytic_ik.hpp      AnalyticIk: every posture of a pose, for six joints with a spherical wrist
 ///     dynamics.hpp         Dynamics: mass matrix, Coriolis, gravity, by KDL (not included)
 ///     constrained_ik.hpp   ConstrainedIk: a pose exactly in part, the rest as limits allow; time scaling (not included)
@@ -49,6 +50,7 @@
 #include <sigmaik/singularities.hpp>
 #include <sigmaik/spectrum.hpp>
 #include <sigmaik/status.hpp>
+#include <sigmaik/target_stream.hpp>
 #include <sigmaik/task.hpp>
 #include <sigmaik/types.hpp>
 #include <sigmaik/velocity_solver.hpp>

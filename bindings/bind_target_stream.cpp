@@ -1,0 +1,132 @@
+#include <pybind11/native_enum.h>
+
+#include "arguments.hpp"
+
+namespace sigmaik::bindings {
+namespace {
+
+StreamMode mode_argument(const std::string& text) {
+  if (text == "hold") return StreamMode::Hold;
+  if (text == "interpolate") return StreamMode::Interpolate;
+  if (text == "predict") return StreamMode::Predict;
+  throw Error("mode = '" + text + "' must be 'hold', 'interpolate' or 'predict'");
+}
+
+double time_argument(double time) {
+  if (!std::isfinite(time)) throw Error("time is not finite");
+  return time;
+}
+
+}  // namespace
+
+void bind_target_stream(py::module_& m) {
+  py::native_enum<StreamStatus>(m, "StreamStatus", "enum.IntEnum", "What a target is, ordered from the best to the worst.")
+      .value("TRACKING", StreamStatus::Tracking, "as the samples say, or within the horizon of the last one")
+      .value("COASTING", StreamStatus::Coasting, "longer without a sample than the horizon: coming to rest")
+      .value("STALE", StreamStatus::Stale, "longer than the timeout: holding still")
+      .value("WAITING", StreamStatus::Waiting, "no sample yet: where reset() said, or nowhere")
+      .finalize();
+  py::native_enum<SampleStatus>(m, "SampleStatus", "enum.IntEnum", "What became of a sample.")
+      .value("ACCEPTED", SampleStatus::Accepted)
+      .value("RELOCATED", SampleStatus::Relocated, "accepted after a run of refused ones: the target is elsewhere, or the clock was set")
+      .value("OUTLIER", SampleStatus::Outlier, "refused: too far from the last one for max_speed or max_angular_speed")
+      .value("OUT_OF_ORDER", SampleStatus::OutOfOrder, "refused: its stamp is not later than the last one's")
+      .value("INVALID", SampleStatus::Invalid, "refused: more than 10⁹ m away; what is not a pose raises")
+      .finalize();
+
+  py::class_<SampleCounts>(m, "SampleCounts", "How many samples had which fate.")
+      .def_readonly("accepted", &SampleCounts::accepted, "Relocated ones included.")
+      .def_readonly("relocated", &SampleCounts::relocated)
+      .def_readonly("outliers", &SampleCounts::outliers)
+      .def_readonly("out_of_order", &SampleCounts::out_of_order)
+      .def_readonly("invalid", &SampleCounts::invalid)
+      .def("__repr__", [](const SampleCounts& c) {
+        return "SampleCounts(accepted=" + std::to_string(c.accepted) + ", relocated=" + std::to_string(c.relocated) +
+               ", outliers=" + std::to_string(c.outliers) + ", out_of_order=" + std::to_string(c.out_of_order) +
+               ", invalid=" + std::to_string(c.invalid) + ")";
+      });
+
+  py::class_<Target>(m, "Target", "Where to be now, and how to move: servo.update(target.pose, target.twist).")
+      .def_property_readonly("pose", [](const Target& t) { return to_numpy(t.pose.matrix()); }, "(4, 4) in base.")
+      .def_property_readonly("twist", [](const Target& t) { return to_numpy(t.twist); },
+                             "(6,) derivative of the pose: [v; ω], base axes, at its origin.")
+      .def_readonly("status", &Target::status, "See StreamStatus.")
+      .def_readonly("age", &Target::age, "[s] since the newest sample was taken; 0 before the first.")
+      .def("__repr__", [](const Target& t) {
+        return std::string("Target(status=") + to_string(t.status) + ", age=" + py::str(py::float_(t.age)).cast<std::string>() + ")";
+      });
+
+  py::class_<TargetStream>(
+      m, "TargetStream",
+      "The way from a sensor to a servo: stamped samples of a pose in, one smooth target a cycle out.\n\n"
+      "    stream.push(stamp, pose)                     # whenever there is one: stamp = when it was taken\n"
+      "    target = stream.at(now)                      # each cycle, on the same clock\n"
+      "    servo.update(target.pose, target.twist)\n\n"
+      "Samples may come late, doubled, wrong or not at all. Targets are continuous, with their twist, and never faster\n"
+      "than max_speed and max_angular_speed: not when a sample arrives, not when the stream stops or starts again, not\n"
+      "when the target is found elsewhere.")
+      .def(py::init([](const std::string& mode, double max_speed, double max_angular_speed, double smoothing, double latency,
+                       double horizon, double timeout, double noise_linear, double noise_angular,
+                       double acceleration_linear, double acceleration_angular, int relocate) {
+             TargetStreamOptions options;
+             options.mode = mode_argument(mode);
+             options.max_speed = max_speed;
+             options.max_angular_speed = max_angular_speed;
+             options.smoothing = smoothing;
+             options.latency = latency;
+             options.horizon = horizon;
+             options.timeout = timeout;
+             options.noise_linear = noise_linear;
+             options.noise_angular = noise_angular;
+             options.acceleration_linear = acceleration_linear;
+             options.acceleration_angular = acceleration_angular;
+             options.relocate = relocate;
+             return TargetStream(options);
+           }),
+           py::arg("mode") = "predict", py::kw_only(), py::arg("max_speed") = TargetStreamOptions{}.max_speed,
+           py::arg("max_angular_speed") = TargetStreamOptions{}.max_angular_speed,
+           py::arg("smoothing") = TargetStreamOptions{}.smoothing, py::arg("latency") = TargetStreamOptions{}.latency,
+           py::arg("horizon") = TargetStreamOptions{}.horizon, py::arg("timeout") = TargetStreamOptions{}.timeout,
+           py::arg("noise_linear") = TargetStreamOptions{}.noise_linear,
+           py::arg("noise_angular") = TargetStreamOptions{}.noise_angular,
+           py::arg("acceleration_linear") = TargetStreamOptions{}.acceleration_linear,
+           py::arg("acceleration_angular") = TargetStreamOptions{}.acceleration_angular,
+           py::arg("relocate") = TargetStreamOptions{}.relocate,
+           "mode: where the target is between samples, and after the last one. 'hold': at the last sample, for devices that\n"
+           "    send only changes; 'interpolate': on a smooth curve through the samples, `latency` ago; 'predict': where a\n"
+           "    constant-velocity Kalman filter expects it now.\n"
+           "max_speed [m/s], max_angular_speed [rad/s]: nothing is faster; a sample that would have to be is an outlier.\n"
+           "smoothing: [s] time constant of the way from where the target is to where a new sample says it is; at 0 the\n"
+           "    twist jumps.\n"
+           "latency: [s] 'interpolate' plays so late: the sensor's delay, and one or two samples.\n"
+           "horizon, timeout: [s] so long after its last sample the target moves on as it did, and by then it has come to\n"
+           "    rest, and the stream is stale.\n"
+           "noise_linear [m], noise_angular [rad]: standard deviation of a sample, each axis.\n"
+           "acceleration_linear [m/s²], acceleration_angular [rad/s²]: of what the target may do between samples.\n"
+           "relocate: so many refused samples in a row that agree with each other are believed.")
+      .def(
+          "reset",
+          [](TargetStream& s, const py::object& start) {
+            if (start.is_none()) {
+              s.reset();
+            } else {
+              s.reset(pose_argument(start, "start"));
+            }
+          },
+          py::arg("start") = py::none(),
+          "Forgets everything. The next target is at `start` (4, 4), such as the tip's pose, and goes to the samples from\n"
+          "there; with None it is where the first sample is.")
+      .def(
+          "push",
+          [](TargetStream& s, double time, const py::object& pose) {
+            return s.push(time_argument(time), pose_argument(pose, "pose"));
+          },
+          py::arg("time"), py::arg("pose"),
+          "A sample: when it was taken [s], and the pose (4, 4) then. Raises Error where it is not a pose.")
+      .def(
+          "at", [](TargetStream& s, double time) { return s.at(time_argument(time)); }, py::arg("time"),
+          "The target at a time [s] not before that of the last call; else the last one again.")
+      .def_property_readonly("counts", &TargetStream::counts, py::return_value_policy::copy, "How many samples had which fate.");
+}
+
+}  // namespace sigmaik::bindings

@@ -1,0 +1,331 @@
+#include <sigmaik/target_stream.hpp>
+
+#include <algorithm>
+#include <cmath>
+
+#include "length.hpp"
+#include "message.hpp"
+
+namespace sigmaik {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using detail::require;
+
+constexpr double kFarthest = 1e9;  // [m]: differences, and their squares, stay finite
+constexpr double kSigmas = 4.0;    // of the noise of two samples: not yet motion
+
+void check(const char* what, double value, bool zero_allowed) {
+  require(std::isfinite(value) && (value > 0.0 || (zero_allowed && value == 0.0)), what, " = ", value,
+          " must be finite and ", zero_allowed ? "at least" : "above", " 0");
+}
+
+Matrix3d normalised(const Matrix3d& rotation) noexcept {
+  return Eigen::Quaterniond(rotation).normalized().toRotationMatrix();
+}
+
+void bound(Twist& twist, const TargetStreamOptions& options) noexcept {
+  detail::shorten(twist.head<3>(), options.max_speed);
+  detail::shorten(twist.tail<3>(), options.max_angular_speed);
+}
+
+// p(u) on [0, 1] from 0 to `end` with slopes a and b there, and its derivative in u.
+void hermite(const Vector3d& end, const Vector3d& a, const Vector3d& b, double u, Vector3d& p, Vector3d& slope) noexcept {
+  const double v = 1.0 - u;
+  p = u * u * (3.0 - 2.0 * u) * end + u * v * v * a - u * u * v * b;
+  slope = 6.0 * u * v * end + v * (1.0 - 3.0 * u) * a + u * (3.0 * u - 2.0) * b;
+}
+
+}  // namespace
+
+const char* to_string(StreamStatus status) noexcept {
+  switch (status) {
+    case StreamStatus::Tracking: return "tracking";
+    case StreamStatus::Coasting: return "coasting";
+    case StreamStatus::Stale: return "stale";
+    case StreamStatus::Waiting: return "waiting";
+  }
+  return "?";
+}
+
+const char* to_string(SampleStatus status) noexcept {
+  switch (status) {
+    case SampleStatus::Accepted: return "accepted";
+    case SampleStatus::Relocated: return "relocated";
+    case SampleStatus::Outlier: return "outlier";
+    case SampleStatus::OutOfOrder: return "out of order";
+    case SampleStatus::Invalid: return "invalid";
+  }
+  return "?";
+}
+
+TargetStream::TargetStream(const TargetStreamOptions& options) : options_(options) {
+  check("max_speed", options.max_speed, false);
+  check("max_angular_speed", options.max_angular_speed, false);
+  check("smoothing", options.smoothing, true);
+  check("latency", options.latency, true);
+  check("horizon", options.horizon, true);
+  check("timeout", options.timeout, false);
+  require(options.timeout >= options.horizon, "timeout = ", options.timeout, " s must be at least the horizon, ",
+          options.horizon, " s");
+  check("noise_linear", options.noise_linear, false);
+  check("noise_angular", options.noise_angular, false);
+  check("acceleration_linear", options.acceleration_linear, false);
+  check("acceleration_angular", options.acceleration_angular, false);
+  require(options.relocate >= 1, "relocate = ", options.relocate, " must be at least 1");
+}
+
+void TargetStream::reset() noexcept {
+  counts_ = {};
+  count_ = candidates_ = 0;
+  last_ = {};
+  placed_ = timed_ = false;
+}
+
+void TargetStream::reset(const Pose& start) {
+  require(is_pose(start.matrix()), "start is not a pose");
+  reset();
+  last_.pose.translation() = start.translation();
+  last_.pose.linear() = normalised(start.linear());
+  placed_ = true;
+}
+
+// Samples ------------------------------------------------------------------------------------------------------------
+
+bool TargetStream::reachable(const Sample& from, const Sample& to) const noexcept {
+  const Twist way = pose_error(from.pose, to.pose);
+  const double seconds = to.time - from.time, noise = kSigmas * std::sqrt(2.0);
+  return detail::length(way.head<3>()) <= options_.max_speed * seconds + noise * options_.noise_linear &&
+         detail::length(way.tail<3>()) <= options_.max_angular_speed * seconds + noise * options_.noise_angular;
+}
+
+SampleStatus TargetStream::push(double time, const Pose& pose) noexcept {
+  if (!std::isfinite(time) || !is_pose(pose.matrix()) || pose.translation().cwiseAbs().maxCoeff() > kFarthest) {
+    ++counts_.invalid;
+    return SampleStatus::Invalid;
+  }
+  Sample next;
+  next.time = time;
+  next.pose.translation() = pose.translation();
+  next.pose.linear() = normalised(pose.linear());
+
+  if (count_ == 0) {
+    start(next);
+    ++counts_.accepted;
+    return SampleStatus::Accepted;
+  }
+  const Sample& newest = sample(count_ - 1);
+  if (time > newest.time && reachable(newest, next)) {
+    candidates_ = 0;
+    ++counts_.accepted;
+    if (time - newest.time > options_.timeout) {  // what it did before says nothing
+      start(next);
+    } else {
+      if (options_.mode == StreamMode::Predict) correct(next);
+      extend(next);
+    }
+    return SampleStatus::Accepted;
+  }
+  const SampleStatus refused = time > newest.time ? SampleStatus::Outlier : SampleStatus::OutOfOrder;
+  ++(refused == SampleStatus::Outlier ? counts_.outliers : counts_.out_of_order);
+  if (time == newest.time) return refused;  // twice the same says nothing
+  const bool agrees = candidates_ > 0 && time > candidate_.time && reachable(candidate_, next);
+  candidates_ = agrees ? candidates_ + 1 : 1;
+  candidate_ = next;
+  if (candidates_ < options_.relocate) return refused;
+  candidates_ = 0;
+  start(next);
+  ++counts_.accepted;
+  ++counts_.relocated;
+  return SampleStatus::Relocated;
+}
+
+void TargetStream::start(const Sample& next) noexcept {
+  first_ = 0;
+  count_ = 1;
+  history_[0] = next;
+  estimate_ = {next.pose, Twist::Zero()};
+  const auto unknown = [](double noise, double speed) { return Covariance{noise * noise, 0.0, 0.25 * speed * speed}; };
+  linear_ = unknown(options_.noise_linear, options_.max_speed);
+  angular_ = unknown(options_.noise_angular, options_.max_angular_speed);
+}
+
+void TargetStream::extend(const Sample& next) noexcept {
+  int at = 0;
+  if (options_.mode == StreamMode::Interpolate) {
+    // Of a sensor so fast that the ring would not reach back to what is played, every so manyth sample, and the newest.
+    const double least = options_.latency / (0.75 * kHistory);
+    at = count_ >= 2 && sample(count_ - 1).time - sample(count_ - 2).time < least ? count_ - 1 : count_;
+    if (at == kHistory) {
+      first_ = (first_ + 1) % kHistory;
+      --at;
+    }
+  }
+  history_[static_cast<std::size_t>((first_ + at) % kHistory)] = next;
+  count_ = at + 1;
+}
+
+void TargetStream::correct(const Sample& next) noexcept {
+  const double dt = next.time - sample(count_ - 1).time;
+  Twist& twist = estimate_.twist;
+  Pose ahead;
+  ahead.translation() = estimate_.pose.translation() + dt * twist.head<3>();
+  ahead.linear() = rotation_exp(dt * twist.tail<3>()) * estimate_.pose.linear();
+  const Twist innovation = pose_error(ahead, next.pose);
+
+  // Q = a² [dt⁴/4 dt³/2; dt³/2 dt²], of an acceleration that is constant in dt.
+  const auto gains = [dt](Covariance& p, double noise, double acceleration) {
+    const double a = acceleration * dt;
+    p.place += dt * (2.0 * p.cross + dt * p.velocity) + 0.25 * a * a * dt * dt;
+    p.cross += dt * p.velocity + 0.5 * a * a * dt;
+    p.velocity += a * a;
+    const double s = p.place + noise * noise;
+    const Eigen::Vector2d k(p.place / s, p.cross / s);
+    p.velocity -= k[1] * p.cross;
+    p.cross *= noise * noise / s;
+    p.place *= noise * noise / s;
+    return k;
+  };
+  const Eigen::Vector2d k = gains(linear_, options_.noise_linear, options_.acceleration_linear);
+  const Eigen::Vector2d h = gains(angular_, options_.noise_angular, options_.acceleration_angular);
+  estimate_.pose.translation() = ahead.translation() + k[0] * innovation.head<3>();
+  estimate_.pose.linear() = normalised(rotation_exp(h[0] * innovation.tail<3>()) * ahead.linear());
+  twist.head<3>() += k[1] * innovation.head<3>();
+  twist.tail<3>() += h[1] * innovation.tail<3>();
+  bound(twist, options_);
+}
+
+// Motion -------------------------------------------------------------------------------------------------------------
+
+// At sample i, of the parabola through it and its neighbours: each side's mean twist counts by the other side's time. The
+// first, which is played after a start only, is left from rest.
+Twist TargetStream::slope(int i) const noexcept {
+  if (i == 0) return Twist::Zero();
+  const double before = sample(i).time - sample(i - 1).time;
+  Twist twist = pose_error(sample(i - 1).pose, sample(i).pose) / before;
+  if (i + 1 < count_) {
+    const double after = sample(i + 1).time - sample(i).time;
+    const Twist ahead = pose_error(sample(i).pose, sample(i + 1).pose) / after;
+    twist = (after * twist + before * ahead) / (before + after);
+  }
+  bound(twist, options_);
+  return twist;
+}
+
+// On from a motion: at its twist for `horizon`, then more slowly, to rest at `timeout`.
+TargetStream::Motion TargetStream::coast(const Motion& from, double seconds) const noexcept {
+  const double fade = options_.timeout - options_.horizon;
+  double moved = std::max(seconds, -options_.timeout), rate = 1.0;
+  if (moved > options_.horizon) {
+    // rate = 1 − 3u² + 2u³
+    const double u = fade > 0.0 ? std::min(1.0, (moved - options_.horizon) / fade) : 1.0;
+    moved = options_.horizon + fade * u * (1.0 + u * u * (0.5 * u - 1.0));
+    rate = 1.0 + u * u * (2.0 * u - 3.0);
+  }
+  Motion out;
+  out.pose.translation() = from.pose.translation() + moved * from.twist.head<3>();
+  out.pose.linear() = rotation_exp(moved * from.twist.tail<3>()) * from.pose.linear();
+  out.twist = rate * from.twist;
+  return out;
+}
+
+TargetStream::Motion TargetStream::motion(double time) const noexcept {
+  const Sample& newest = sample(count_ - 1);
+  if (options_.mode == StreamMode::Hold) return {newest.pose, Twist::Zero()};
+  if (options_.mode == StreamMode::Predict) return coast(estimate_, time - newest.time);
+
+  const double play = time - options_.latency;
+  if (play >= newest.time) return coast({newest.pose, slope(count_ - 1)}, play - newest.time);
+  int i = count_ - 2;
+  while (i >= 0 && sample(i).time > play) --i;
+  if (i < 0) return {sample(0).pose, Twist::Zero()};
+  const Sample &a = sample(i), &b = sample(i + 1);
+  const double dt = b.time - a.time, u = (play - a.time) / dt;
+  const Twist way = pose_error(a.pose, b.pose), begin = dt * slope(i), end = dt * slope(i + 1);
+  Vector3d place, speed, angle, rate;
+  hermite(way.head<3>(), begin.head<3>(), end.head<3>(), u, place, speed);
+  hermite(way.tail<3>(), begin.tail<3>(), rotation_log_rate(way.tail<3>(), end.tail<3>()), u, angle, rate);
+  Motion out;
+  out.pose.translation() = a.pose.translation() + place;
+  out.pose.linear() = rotation_exp(angle) * a.pose.linear();
+  out.twist << speed / dt, rotation_exp_rate(angle, rate) / dt;
+  return out;
+}
+
+StreamStatus TargetStream::status(double time) const noexcept {
+  const bool late = options_.mode == StreamMode::Interpolate;
+  const double without = time - sample(count_ - 1).time - (late ? options_.latency : 0.0);
+  if (without >= options_.timeout) return StreamStatus::Stale;
+  return without > options_.horizon ? StreamStatus::Coasting : StreamStatus::Tracking;
+}
+
+// Output -------------------------------------------------------------------------------------------------------------
+
+Target TargetStream::at(double time) noexcept {
+  if (!std::isfinite(time) || (timed_ && time < time_)) return last_;
+  const double dt = timed_ ? time - time_ : 0.0;
+  if (count_ > 0) {
+    last_.status = status(time);
+    last_.age = time - sample(count_ - 1).time;
+    if (!placed_) {
+      const Motion now = motion(time);
+      last_.pose = now.pose;
+      last_.twist = now.twist;
+      bound(last_.twist, options_);
+      placed_ = true;
+    } else if (dt > 0.0) {
+      const Motion then = motion(time_), now = motion(time);
+      // d takes the motion to the target: the target's pose is exp(d) R, its ω that of exp(d), and exp(d) ω_R.
+      const Twist d = pose_error(then.pose, last_.pose);
+      const Matrix3d turn = rotation_exp(d.tail<3>());
+      Twist rate = last_.twist - then.twist;
+      rate.tail<3>() = rotation_log_rate(d.tail<3>(), last_.twist.tail<3>() - turn * then.twist.tail<3>());
+
+      // d(t) = (d + (ḋ + kd) t) e^(−kt), k = 1/τ
+      Twist left = Twist::Zero(), slower = Twist::Zero();
+      if (options_.smoothing > 0.0 && dt < 700.0 * options_.smoothing) {
+        const double k = 1.0 / options_.smoothing, decay = std::exp(-k * dt);
+        const Twist c = rate + k * d;
+        left = decay * (d + dt * c);
+        slower = decay * (rate - k * dt * c);
+        const auto limit = [&](auto part, double largest) {  // which slowing down, v/(eτ) at most, never meets
+          Eigen::Vector3d change = part(slower) - part(rate);
+          if (detail::length(change) <= k * dt * largest) return;
+          detail::shorten(change, k * dt * largest);
+          part(slower) = part(rate) + change;
+          part(left) = part(d) + dt * (part(rate) + 0.5 * change);
+        };
+        limit([](auto& x) { return x.template head<3>(); }, options_.max_speed);
+        limit([](auto& x) { return x.template tail<3>(); }, options_.max_angular_speed);
+      }
+      const Matrix3d turned = rotation_exp(left.tail<3>());
+      Pose next;
+      next.translation() = now.pose.translation() + left.head<3>();
+      next.linear() = turned * now.pose.linear();
+      Twist twist;
+      twist.head<3>() = now.twist.head<3>() + slower.head<3>();
+      twist.tail<3>() = rotation_exp_rate(left.tail<3>(), slower.tail<3>()) + turned * now.twist.tail<3>();
+
+      Twist step = pose_error(last_.pose, next);
+      if (detail::length(step.head<3>()) > options_.max_speed * dt) {
+        detail::shorten(step.head<3>(), options_.max_speed * dt);
+        next.translation() = last_.pose.translation() + step.head<3>();
+        twist.head<3>() = step.head<3>() / dt;
+      }
+      if (detail::length(step.tail<3>()) > options_.max_angular_speed * dt) {
+        detail::shorten(step.tail<3>(), options_.max_angular_speed * dt);
+        next.linear() = normalised(rotation_exp(step.tail<3>()) * last_.pose.linear());
+        twist.tail<3>() = step.tail<3>() / dt;
+      }
+      bound(twist, options_);
+      last_.pose = next;
+      last_.twist = twist;
+    }
+  }
+  time_ = time;
+  timed_ = true;
+  return last_;
+}
+
+}  // namespace sigmaik
