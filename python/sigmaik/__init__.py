@@ -11,17 +11,20 @@
 Units are m, rad, s, N·m. Twists and Jacobians are [v; ω], in base axes, at the tip's origin.
 """
 
-from . import indices, planning, robots, singularities
+from . import indices, planning, robots, sim, singularities
 from ._core import (
     AdaptiveDampedLeastSquares,
     AnalyticBranch,
     AnalyticIk,
     Chain,
+    ComputedTorque,
+    ComputedTorqueStep,
     ConstrainedIk,
     ConstrainedIkStep,
     DampedLeastSquares,
     Dynamics,
     Error,
+    Inertia,
     JacobianProjection,
     JacobianSafety,
     JacobianSafetyProjection,
@@ -29,6 +32,7 @@ from ._core import (
     JParse,
     LeastSquaresSolution,
     PseudoInverse,
+    Segment,
     SelectivelyDampedLeastSquares,
     Servo,
     ServoStep,
@@ -49,11 +53,14 @@ __all__ = [
     "AnalyticBranch",
     "AnalyticIk",
     "Chain",
+    "ComputedTorque",
+    "ComputedTorqueStep",
     "ConstrainedIk",
     "ConstrainedIkStep",
     "DampedLeastSquares",
     "Dynamics",
     "Error",
+    "Inertia",
     "JParse",
     "JacobianProjection",
     "JacobianSafety",
@@ -61,6 +68,7 @@ __all__ = [
     "JointLimits",
     "LeastSquaresSolution",
     "PseudoInverse",
+    "Segment",
     "SelectivelyDampedLeastSquares",
     "Servo",
     "ServoStep",
@@ -76,6 +84,7 @@ __all__ = [
     "robots",
     "rotation_exp",
     "rotation_log",
+    "sim",
     "singularities",
     "solve_batch",
 ]

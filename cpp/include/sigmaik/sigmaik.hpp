@@ -21,7 +21,8 @@
 ///     avoidance.hpp        Avoidance: a posture velocity away from singularities
 ///     servo.hpp            Servo: pose or twist in, joint command out, each cycle
 ///     analytic_ik.hpp      AnalyticIk: every posture of a pose, for six joints with a spherical wrist
-///     dynamics.hpp         Dynamics: mass matrix, Coriolis, gravity, by KDL (not included)
+///     dynamics.hpp         Dynamics: mass matrix, Coriolis, gravity, payload, by KDL (not included)
+///     computed_torque.hpp  ComputedTorque: joint torques along a planned motion (not included)
 ///     constrained_ik.hpp   ConstrainedIk: a pose exactly in part, the rest as limits allow; time scaling (not included)
 ///     planning/time_optimal.hpp  TimeOptimal: motions within limits, away from what a cost marks (not included)
 ///     planning/support_states.hpp  SupportPlanner: smooth motions along which a cost is low, by gradient or samples
