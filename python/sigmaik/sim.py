@@ -131,6 +131,7 @@ class Simulation:
         self._compensation = _core.Dynamics(chain, gravity) if gravity_compensation and actuation == "velocity" else None
         effort = np.array(chain.limits.effort)
         self._effort = effort if effort_limits else np.full(n, math.inf)
+        self._cut = (1.0 - 1e-9) * self._effort  # a torque that was scaled down to its limit counts
         speed = np.array(chain.limits.velocity)
         self._speed = speed if velocity_limits else np.full(n, math.inf)
         gain = None
@@ -142,7 +143,7 @@ class Simulation:
         self._gain, self._integral_rate = gain, integral_rate
         self.model = _model(chain, gain, self._effort, position_stops, joints, payload, gravity, timestep)
 
-        import mujoco
+        import mujoco  # type: ignore[import-untyped]
 
         self._step = mujoco.mj_step
         self._forward = mujoco.mj_forward
@@ -189,7 +190,7 @@ class Simulation:
                 error = asked - data.qvel
             self._step(self.model, data)
             torque = np.abs(data.actuator_force)
-            cut = torque >= self._effort
+            cut = torque >= self._cut
             if self._gain is not None:
                 self._integral += np.where(cut, 0.0, self.timestep * error)
             self._saturated += cut
@@ -378,7 +379,7 @@ class Execution:
     planned: Array = field(repr=False)  #: (N, n) [rad or m]
     q: Array = field(repr=False)  #: (N, n) where the arm truly was
     qdot: Array = field(repr=False)  #: (N, n) [rad/s or m/s]
-    torque: Array = field(repr=False)  #: (N, n) the largest |τ| in the period after the sample [N·m or N]
+    torque: Array = field(repr=False)  #: (N, n) the largest |τ| in the period after the sample (the last: before) [N·m or N]
     saturation: Array = field(repr=False)  #: (N, n) the part of it at the effort limit
     effort: Array = field(repr=False)  #: (n,) the effort limits, infinite where there is none
 
@@ -444,7 +445,7 @@ def execute(
         raise ValueError("a simulation of velocities takes no torques: control must be None")
     start = float(trajectory.t[0]) if trajectory.t.size else 0.0
     samples = max(1, math.ceil((trajectory.duration + settle) / period - 1e-9)) + 1 if trajectory.t.size else 0
-    t = period * np.arange(samples)
+    t: Array = period * np.arange(samples, dtype=np.float64)
     planned, velocity, _ = trajectory.sample(start + t)
     velocity[t > trajectory.duration] = 0.0  # held at the end, even where a trajectory ends in motion
     if simulation.actuation == "torque" and control is None:
@@ -469,4 +470,5 @@ def execute(
         torque[k], saturation[k] = simulation.peak_torque, simulation.saturated
         if progress is not None:
             progress(simulation.t)
+    torque[-1], saturation[-1] = torque[-2], saturation[-2]  # no period follows the last sample
     return Execution(t, planned, q, qdot, torque, saturation, np.array(chain.limits.effort))

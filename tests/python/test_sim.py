@@ -225,8 +225,9 @@ def test_payload_unknown_and_known(panda, plan):
 
 def test_saturation_is_told(panda, plan):
     arm, _ = panda
-    fast = plan.retimed(0.6 * plan.duration)
-    done = execute(Simulation(arm, actuation="torque"), fast)
+    weak = arm.with_limits(effort=0.5 * arm.limits.effort)
+    fast = plan.retimed(0.2 * plan.duration)
+    done = execute(Simulation(weak, actuation="torque"), fast, sk.ComputedTorque(weak))
     assert done.saturated > 0.01
     assert done.max_effort == pytest.approx(1.0)
     assert done.max_error > 1e-2
