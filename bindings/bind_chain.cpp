@@ -38,6 +38,48 @@ void bind_chain(py::module_& m) {
       .def_property_readonly("jerk", [](const JointLimits& l) { return to_numpy(l.jerk); }, "(n,) [rad/s³ or m/s³]")
       .def_property_readonly("effort", [](const JointLimits& l) { return to_numpy(l.effort); }, "(n,) [N·m or N]");
 
+  py::class_<Inertia>(m, "Inertia", "Mass distribution of a link, or of what the tip carries. Immutable.")
+      .def(py::init([](double mass, const ArrayLike& center_of_mass, const MaybeArray& tensor) {
+             Inertia inertia;
+             inertia.mass = mass;
+             inertia.center_of_mass =
+                 Eigen::Map<const Eigen::Vector3d>(array_argument(center_of_mass, "center_of_mass", {3}, "(3,)").data());
+             if (tensor) {
+               const Array array = array_argument(*tensor, "tensor", {3, 3}, "(3, 3)");
+               inertia.tensor = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(array.data());
+             }
+             return inertia;
+           }),
+           py::arg("mass"), py::arg("center_of_mass") = py::make_tuple(0.0, 0.0, 0.0), py::arg("tensor") = py::none(),
+           "mass: [kg].\n"
+           "center_of_mass: (3,) [m], in the link's frame.\n"
+           "tensor: (3, 3) [kg·m²], about the centre of mass, in the link's axes; None: a point mass.\n\n"
+           "Chains and Dynamics check the values.")
+      .def_readonly("mass", &Inertia::mass, "[kg]")
+      .def_property_readonly("center_of_mass", [](const Inertia& i) { return to_numpy(i.center_of_mass); },
+                             "(3,) [m], in the link's frame")
+      .def_property_readonly("tensor", [](const Inertia& i) { return to_numpy(i.tensor); },
+                             "(3, 3) [kg·m²], about the centre of mass, in the link's axes")
+      .def("__repr__", [](const Inertia& i) {
+        return "Inertia(" + py::repr(py::float_(i.mass)).cast<std::string>() + " kg)";
+      });
+
+  py::class_<Segment>(m, "Segment",
+                      "A joint, fixed or movable, and the link that it carries. The link's frame is the joint's after the "
+                      "motion: parent ← origin · motion(axis, q).")
+      .def_readonly("joint_name", &Segment::joint_name, "Name of the joint.")
+      .def_readonly("link_name", &Segment::link_name, "Name of the link.")
+      .def_property_readonly("type", [](const Segment& s) { return to_string(s.type); },
+                             "'fixed', 'revolute', 'continuous' or 'prismatic'.")
+      .def_property_readonly("origin", [](const Segment& s) { return to_numpy(s.origin.matrix()); },
+                             "(4, 4) the joint's frame in the parent link, at q = 0")
+      .def_property_readonly("axis", [](const Segment& s) { return to_numpy(s.axis); },
+                             "(3,) unit vector in the joint's frame")
+      .def_readonly("inertia", &Segment::inertia, "Of the link, None where it is not known.")
+      .def("__repr__", [](const Segment& s) {
+        return "Segment('" + s.joint_name + "' carries '" + s.link_name + "', " + to_string(s.type) + ")";
+      });
+
   py::class_<Chain>(m, "Chain",
                     "A serial arm: joints, limits and inertias between a base and a tip. Immutable, safe to share.\n\n"
                     "Twists and Jacobians are [v; ω], in the axes of the base, at the tip's origin\n"
@@ -79,6 +121,11 @@ void bind_chain(py::module_& m) {
             return py::tuple(types);
           },
           "'revolute', 'continuous' or 'prismatic' for every movable joint, base to tip.")
+      .def_property_readonly("segments",
+                             [](const Chain& c) -> py::typing::Tuple<Segment, py::ellipsis> {
+                               return py::tuple(py::cast(c.segments()));
+                             },
+                             "Everything between base and tip, fixed joints included.")
       .def_property_readonly("limits", &Chain::limits, "Limits of the movable joints.")
       .def(
           "with_limits",

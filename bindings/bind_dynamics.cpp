@@ -1,20 +1,29 @@
-#include <sigmaik/dynamics.hpp>
+#include <sigmaik/computed_torque.hpp>
 
 #include "arguments.hpp"
 
 namespace sigmaik::bindings {
+namespace {
+
+Eigen::Vector3d gravity_argument(const MaybeArray& gravity, const Eigen::Vector3d& otherwise) {
+  if (!gravity) return otherwise;
+  return Eigen::Map<const Eigen::Vector3d>(array_argument(*gravity, "gravity", {3}, "(3,)").data());
+}
+
+}  // namespace
 
 void bind_dynamics(py::module_& m) {
   py::class_<Dynamics>(m, "Dynamics",
-                       "Rigid-body dynamics M(q) q̈ + C(q, q̇) q̇ + g(q) = τ of a chain, by KDL's ChainDynParam.")
-      .def(py::init([](const Chain& chain, const MaybeArray& gravity) {
-             if (!gravity) return Dynamics(chain);
-             const Array array = array_argument(*gravity, "gravity", {3}, "(3,)");
-             return Dynamics(chain, Eigen::Map<const Eigen::Vector3d>(array.data()));
+                       "Rigid-body dynamics M(q) q̈ + C(q, q̇) q̇ + g(q) = τ of a chain with what it carries, by KDL.")
+      .def(py::init([](const Chain& chain, const MaybeArray& gravity, const std::optional<Inertia>& payload) {
+             return Dynamics(chain, gravity_argument(gravity, {0.0, 0.0, -9.80665}), payload);
            }),
-           py::arg("chain"), py::arg("gravity") = py::none(),
-           "gravity: (3,) [m/s²] in base axes; by default 9.80665 m/s² along −z.\n\n"
-           "Raises Error where a movable joint carries no link whose inertia is known.")
+           py::arg("chain"), py::arg("gravity") = py::none(), py::arg("payload") = py::none(),
+           "gravity: (3,) [m/s²] in base axes; by default 9.80665 m/s² along −z.\n"
+           "payload: what the tip carries, in the tip's frame.\n\n"
+           "Raises Error where a movable joint carries no link whose inertia is known, and where the payload is no body:\n"
+           "a mass below 0, a tensor that is not symmetric, a principal moment beyond the sum of the other two.")
+      .def_property_readonly("dof", &Dynamics::dof, "Number of movable joints, n.")
       .def(
           "mass_matrix",
           [](const Dynamics& d, const ArrayLike& q) { return to_numpy(d.mass_matrix(joint_argument(q, "q", d.dof()))); },
@@ -28,7 +37,75 @@ void bind_dynamics(py::module_& m) {
       .def(
           "gravity",
           [](const Dynamics& d, const ArrayLike& q) { return to_numpy(d.gravity(joint_argument(q, "q", d.dof()))); },
-          py::arg("q"), "g (n,) [N·m] at q (n,): the torques that hold the arm.");
+          py::arg("q"), "g (n,) [N·m] at q (n,): the torques that hold the arm.")
+      .def(
+          "inverse_dynamics",
+          [](Dynamics& d, const ArrayLike& q, const ArrayLike& qdot, const ArrayLike& qddot) {
+            JointVector torque;
+            d.inverse_dynamics(joint_argument(q, "q", d.dof()), joint_argument(qdot, "qdot", d.dof()),
+                               joint_argument(qddot, "qddot", d.dof()), torque);
+            return to_numpy(torque);
+          },
+          py::arg("q"), py::arg("qdot"), py::arg("qddot"),
+          "τ = M q̈ + C q̇ + g (n,) [N·m] at q, q̇, q̈ (n,), by one recursion of Newton and Euler.")
+      .def(
+          "forward_dynamics",
+          [](Dynamics& d, const ArrayLike& q, const ArrayLike& qdot, const ArrayLike& torque) {
+            JointVector qddot;
+            if (!d.forward_dynamics(joint_argument(q, "q", d.dof()), joint_argument(qdot, "qdot", d.dof()),
+                                    joint_argument(torque, "torque", d.dof()), qddot)) {
+              throw Error("the mass matrix is not positive definite at this q: the arm's inertias are no bodies'");
+            }
+            return to_numpy(qddot);
+          },
+          py::arg("q"), py::arg("qdot"), py::arg("torque"),
+          "q̈ = M⁻¹ (τ − C q̇ − g) (n,) [rad/s² or m/s²] at q, q̇ (n,) under τ (n,) [N·m].\n\n"
+          "Raises Error where M is not positive definite.");
+
+  py::class_<ComputedTorqueStep>(m, "ComputedTorqueStep", "Answer of one cycle of a ComputedTorque.")
+      .def_property_readonly("torque", [](const ComputedTorqueStep& s) { return to_numpy(s.torque); },
+                             "(n,) [N·m or N], within the chain's effort limits")
+      .def_readonly("status", &ComputedTorqueStep::status, "OK, or LIMITED where an effort limit would be broken.")
+      .def_readonly("scale", &ComputedTorqueStep::scale, "In [0, 1], the part of v that effort limits leave.")
+      .def_property_readonly("limiting_joints", [](const ComputedTorqueStep& s) { return indices(s.limiting_joints); },
+                             "Indices of the joints whose torque would break its limit.")
+      .def("__repr__", [](const ComputedTorqueStep& s) {
+        return std::string("ComputedTorqueStep(status=") + to_string(s.status) +
+               ", torque=" + py::str(to_numpy(s.torque)).cast<std::string>() + ")";
+      });
+
+  const ComputedTorqueOptions defaults;
+  py::class_<ComputedTorque>(m, "ComputedTorque",
+                             "Computed torque control: τ = M(q) v + C(q, q̇) q̇ + g(q), v = q̈_d + 2ζω ė + ω² e, e = q_d − q.\n\n"
+                             "With the true model every joint's error obeys ë + 2ζω ė + ω² e = 0 by itself (Beck et al. 2022,\n"
+                             "eqs. 18 to 20). Where an effort limit of the chain would be broken, v is scaled down in all joints alike.")
+      .def(py::init([](const Chain& chain, double frequency, double damping_ratio, const MaybeArray& gravity,
+                       const std::optional<Inertia>& payload) {
+             return ComputedTorque(chain, {frequency, damping_ratio,
+                                           gravity_argument(gravity, ComputedTorqueOptions{}.gravity), payload});
+           }),
+           py::arg("chain"), py::kw_only(), py::arg("frequency") = defaults.frequency,
+           py::arg("damping_ratio") = defaults.damping_ratio, py::arg("gravity") = py::none(),
+           py::arg("payload") = py::none(),
+           "frequency: ω [rad/s] > 0; the loop's rate should be 10 ω and more.\n"
+           "damping_ratio: ζ > 0; 1 is critical.\n"
+           "gravity, payload: what the controller knows of them, as for Dynamics.\n\n"
+           "Raises Error where an option is out of its range, and where Dynamics does.")
+      .def_property_readonly("dof", &ComputedTorque::dof, "Number of movable joints, n.")
+      .def(
+          "update",
+          [](ComputedTorque& c, const ArrayLike& q, const ArrayLike& qdot, const ArrayLike& q_desired,
+             const ArrayLike& qdot_desired, const ArrayLike& qddot_desired) {
+            const int n = c.dof();
+            const ComputedTorqueStep step =
+                c.update(joint_argument(q, "q", n), joint_argument(qdot, "qdot", n),
+                         joint_argument(q_desired, "q_desired", n), joint_argument(qdot_desired, "qdot_desired", n),
+                         joint_argument(qddot_desired, "qddot_desired", n));
+            if (step.status == Status::BadInput) throw Error("the torque is too large for floating-point numbers");
+            return step;
+          },
+          py::arg("q"), py::arg("qdot"), py::arg("q_desired"), py::arg("qdot_desired"), py::arg("qddot_desired"),
+          "One cycle: the arm is at q, q̇ (n,), and should be at q_d, q̇_d, accelerating by q̈_d.");
 }
 
 }  // namespace sigmaik::bindings

@@ -1,8 +1,12 @@
 #include <sigmaik/dynamics.hpp>
 
+#include <cmath>
 #include <string>
 
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <kdl/chaindynparam.hpp>
+#include <kdl/chainidsolver_recursive_newton_euler.hpp>
 
 #include <sigmaik/kdl.hpp>
 
@@ -18,27 +22,66 @@ KDL::JntArray joints(const Eigen::VectorXd& values, int n, const char* what) {
   return array;
 }
 
+// A body's principal moments are ∫ (y² + z²) dm and its like, so none is more than the sum of the others.
+void check_payload(const Inertia& payload) {
+  const Eigen::Matrix3d& t = payload.tensor;
+  detail::require(std::isfinite(payload.mass) && payload.mass >= 0.0, "payload: mass = ", payload.mass,
+                  " must be finite and not negative");
+  detail::require(payload.center_of_mass.allFinite() && t.allFinite(), "payload: an entry is not finite");
+  const double slack = 1e-9 * t.cwiseAbs().maxCoeff();  // what rounding in a data sheet's conversion leaves
+  detail::require((t - t.transpose()).cwiseAbs().maxCoeff() <= slack, "payload: the tensor is not symmetric");
+  const Eigen::Vector3d moments =
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(t, Eigen::EigenvaluesOnly).eigenvalues();
+  detail::require(moments[0] >= -slack && moments[2] <= moments[0] + moments[1] + slack, "payload: principal moments ",
+                  moments[0], ", ", moments[1], ", ", moments[2],
+                  " are no body's: none is negative, nor more than the sum of the other two");
+  detail::require(payload.mass > 0.0 || t.isZero(0.0), "payload: a tensor without mass");
+}
+
 }  // namespace
 
 struct Dynamics::Model {
-  KDL::Chain chain;  // before the solver, which keeps a reference
+  KDL::Chain chain;  // before the solvers, which keep a reference
   KDL::ChainDynParam solver;
+  KDL::ChainIdSolver_RNE recursion;
   int dof;
-  KDL::JntArray q, qdot, torque;  // scratch of evaluate()
+  KDL::JntArray q, qdot, qddot, torque;  // scratch of the real-time calls
   KDL::JntSpaceInertiaMatrix mass;
+  const KDL::Wrenches no_wrenches;
+  DynamicsTerms terms;
 
-  Model(const Chain& arm, const Eigen::Vector3d& gravity)
-      : chain(to_kdl(arm)),
-        solver(chain, KDL::Vector(gravity.x(), gravity.y(), gravity.z())),
+  Model(const Chain& arm, const KDL::Vector& gravity, const std::optional<Inertia>& payload)
+      : chain(loaded(arm, payload)),
+        solver(chain, gravity),
+        recursion(chain, gravity),
         dof(arm.dof()),
         q(size()),
         qdot(size()),
+        qddot(size()),
         torque(size()),
-        mass(size()) {}
+        mass(size()),
+        no_wrenches(chain.getNrOfSegments(), KDL::Wrench::Zero()) {}
   unsigned size() const { return static_cast<unsigned>(dof); }
+
+  // The payload is one more link, fixed to the tip.
+  static KDL::Chain loaded(const Chain& arm, const std::optional<Inertia>& payload) {
+    KDL::Chain chain = to_kdl(arm);
+    if (payload) {
+      chain.addSegment(KDL::Segment("payload", KDL::Joint(KDL::Joint::None), KDL::Frame::Identity(), to_kdl(*payload)));
+    }
+    return chain;
+  }
+
+  // q, q̇ and q̈ are in the scratch.
+  const Eigen::VectorXd& recurse() {
+    recursion.CartToJnt(q, qdot, qddot, no_wrenches, torque);
+    return torque.data;
+  }
 };
 
-Dynamics::Dynamics(const Chain& chain, const Eigen::Vector3d& gravity) {
+Dynamics::Dynamics(const Chain& chain, const Eigen::Vector3d& gravity, const std::optional<Inertia>& payload) {
+  detail::require(gravity.allFinite(), "gravity has an entry that is not finite");
+  if (payload) check_payload(*payload);
   std::string waiting;  // a movable joint whose links so far have no inertia
   const auto check = [&] {
     detail::require(waiting.empty(), "joint '", waiting, "' carries no link whose inertia is known: no dynamics");
@@ -50,8 +93,9 @@ Dynamics::Dynamics(const Chain& chain, const Eigen::Vector3d& gravity) {
     }
     if (s.inertia) waiting.clear();
   }
+  if (payload && payload->mass > 0.0) waiting.clear();
   check();
-  model_ = std::make_unique<Model>(chain, gravity);
+  model_ = std::make_unique<Model>(chain, KDL::Vector(gravity.x(), gravity.y(), gravity.z()), payload);
 }
 
 Dynamics::~Dynamics() = default;
@@ -66,10 +110,28 @@ void Dynamics::evaluate(const JointRef& q, const JointRef& qdot, DynamicsTerms& 
   m.qdot.data = qdot;
   m.solver.JntToMass(m.q, m.mass);
   terms.mass = m.mass.data;
-  m.solver.JntToCoriolis(m.q, m.qdot, m.torque);
-  terms.bias = m.torque.data;
-  m.solver.JntToGravity(m.q, m.torque);
-  terms.bias += m.torque.data;
+  m.qddot.data.setZero();
+  terms.bias = m.recurse();
+}
+
+void Dynamics::inverse_dynamics(const JointRef& q, const JointRef& qdot, const JointRef& qddot,
+                                JointVector& torque) noexcept {
+  Model& m = *model_;
+  m.q.data = q;
+  m.qdot.data = qdot;
+  m.qddot.data = qddot;
+  torque = m.recurse();
+}
+
+bool Dynamics::forward_dynamics(const JointRef& q, const JointRef& qdot, const JointRef& torque,
+                                JointVector& qddot) noexcept {
+  DynamicsTerms& terms = model_->terms;
+  evaluate(q, qdot, terms);
+  const Eigen::LLT<JointMatrix> factor(terms.mass);
+  const bool definite = factor.info() == Eigen::Success;
+  qddot = JointVector::Zero(dof());
+  if (definite) qddot = factor.solve(torque - terms.bias);
+  return definite;
 }
 
 Eigen::MatrixXd Dynamics::mass_matrix(const Eigen::VectorXd& q) const {

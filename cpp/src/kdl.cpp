@@ -45,13 +45,6 @@ std::optional<Inertia> to_inertia(const KDL::RigidBodyInertia& from) {
   return inertia;
 }
 
-KDL::RigidBodyInertia to_kdl_inertia(const std::optional<Inertia>& inertia) {
-  if (!inertia) return KDL::RigidBodyInertia::Zero();
-  const Eigen::Matrix3d& t = inertia->tensor;
-  return KDL::RigidBodyInertia(inertia->mass, to_kdl_vector(inertia->center_of_mass),
-                               KDL::RotationalInertia(t(0, 0), t(1, 1), t(2, 2), t(0, 1), t(0, 2), t(1, 2)));
-}
-
 // Names for what KDL leaves without one, different from all others.
 class Names {
  public:
@@ -138,6 +131,12 @@ Chain from_kdl(const KDL::Chain& chain, const std::string& base) {
   return Chain(base, std::move(segments));
 }
 
+KDL::RigidBodyInertia to_kdl(const Inertia& inertia) {
+  const Eigen::Matrix3d& t = inertia.tensor;
+  return KDL::RigidBodyInertia(inertia.mass, to_kdl_vector(inertia.center_of_mass),
+                               KDL::RotationalInertia(t(0, 0), t(1, 1), t(2, 2), t(0, 1), t(0, 2), t(1, 2)));
+}
+
 KDL::Chain to_kdl(const Chain& chain) {
   KDL::Chain result;
   for (const Segment& s : chain.segments()) {
@@ -147,7 +146,8 @@ KDL::Chain to_kdl(const Chain& chain) {
       joint = KDL::Joint(s.joint_name, origin.p, origin.M * to_kdl_vector(s.axis),
                          s.type == JointType::Prismatic ? KDL::Joint::TransAxis : KDL::Joint::RotAxis);
     }
-    result.addSegment(KDL::Segment(s.link_name, joint, origin, to_kdl_inertia(s.inertia)));
+    result.addSegment(KDL::Segment(s.link_name, joint, origin,
+                                   s.inertia ? to_kdl(*s.inertia) : KDL::RigidBodyInertia::Zero()));
   }
   return result;
 }

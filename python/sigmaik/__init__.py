@@ -11,17 +11,20 @@
 Units are m, rad, s, N·m. Twists and Jacobians are [v; ω], in base axes, at the tip's origin.
 """
 
-from . import indices, planning, robots, singularities
+from . import indices, planning, robots, sim, singularities
 from ._core import (
     AdaptiveDampedLeastSquares,
     AnalyticBranch,
     AnalyticIk,
     Chain,
+    ComputedTorque,
+    ComputedTorqueStep,
     ConstrainedIk,
     ConstrainedIkStep,
     DampedLeastSquares,
     Dynamics,
     Error,
+    Inertia,
     JacobianProjection,
     JacobianSafety,
     JacobianSafetyProjection,
@@ -33,6 +36,7 @@ from ._core import (
     PseudoInverse,
     SampleCounts,
     SampleStatus,
+    Segment,
     SelectivelyDampedLeastSquares,
     Servo,
     ServoLoop,
@@ -57,11 +61,14 @@ __all__ = [
     "AnalyticBranch",
     "AnalyticIk",
     "Chain",
+    "ComputedTorque",
+    "ComputedTorqueStep",
     "ConstrainedIk",
     "ConstrainedIkStep",
     "DampedLeastSquares",
     "Dynamics",
     "Error",
+    "Inertia",
     "JParse",
     "JacobianProjection",
     "JacobianSafety",
@@ -73,6 +80,7 @@ __all__ = [
     "PseudoInverse",
     "SampleCounts",
     "SampleStatus",
+    "Segment",
     "SelectivelyDampedLeastSquares",
     "Servo",
     "ServoLoop",
@@ -92,6 +100,7 @@ __all__ = [
     "robots",
     "rotation_exp",
     "rotation_log",
+    "sim",
     "singularities",
     "solve_batch",
 ]

@@ -13,8 +13,8 @@ import os
 import pathlib
 import sys
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,9 @@ import sigmaik as sk
 
 from . import experiments as ex
 from .cli_cart import add_cart
+from .cli_execute import add_execute
 from .cli_montecarlo import add_montecarlo
+from .cli_physics import add_physics_options, reach_in_physics
 from .cli_reaching import add_reaching
 from .cli_table import add_table
 from .cli_teleop import add_teleop
@@ -38,6 +40,7 @@ if TYPE_CHECKING:
 __all__ = ["main"]
 
 Array = NDArray[np.float64]
+AnyRun = TypeVar("AnyRun")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -76,6 +79,7 @@ def _parser() -> argparse.ArgumentParser:
     add_cart(commands.add_parser("cart", help="an arm on a cart by its shoulder singularity: four ways to drive the cart"))
     add_teleop(commands.add_parser("teleop", help="drive an arm from a page in the browser, through its singularities"))
     add_track(commands.add_parser("track", help="a target that moves, seen by a camera: errors, delay, jerk, events"))
+    add_execute(commands.add_parser("execute", help="a time-optimal motion in physics, by computed torque and by velocity loops"))
     robots = commands.add_parser("robots", help="list the arms that are shipped, and their paths")
     robots.set_defaults(run=_robots)
     _add_info(commands.add_parser("info", help="an arm's joints, limits, reach and singular values"))
@@ -142,6 +146,7 @@ def _add_reach(parser: argparse.ArgumentParser) -> None:
     ):
         loop.add_argument(option, type=float, metavar=unit, help=text)
     loop.add_argument("--posture", metavar="Q", help="nominal joint positions: home, zero, or a comma list")
+    add_physics_options(parser)
     out = parser.add_argument_group("what is written")
     out.add_argument("--out", default="sigmaik-reach", type=pathlib.Path, metavar="DIR", help="(%(default)s)")
     out.add_argument(
@@ -180,7 +185,15 @@ def _reach(arguments: argparse.Namespace) -> int:
             changes[name] = tuple(_configuration(f"--{name}", text, chain, home))
     experiment = ex.load(arguments.robot, arguments.path, base=arguments.base, tip=arguments.tip, **changes)
     methods = _methods(arguments, experiment.settings)
-    runs = _run_all(experiment, methods, _limits(arguments.limits, experiment.chain))
+    held = _limits(arguments.limits, experiment.chain)
+    stem = f"{experiment.robot}-{experiment.path.name}"
+    if arguments.gains and not arguments.method:
+        stem += "-gains"
+    if arguments.physics:
+        return reach_in_physics(
+            arguments, console, _headline(experiment), experiment, lambda run: _run_all(experiment, methods, held, run), stem
+        )
+    runs = _run_all(experiment, methods, held, lambda method, on, progress: ex.run(experiment, method, on, progress))
 
     from .experiments.table import summary_table
 
@@ -192,9 +205,6 @@ def _reach(arguments: argparse.Namespace) -> int:
         console.print(summary_table(experiment, [r for r in rows if r.velocity_limits == limits], title))
 
     out: pathlib.Path = arguments.out
-    stem = f"{experiment.robot}-{experiment.path.name}"
-    if arguments.gains and not arguments.method:
-        stem += "-gains"
     if arguments.format != "none":
         for run in runs:
             name = run.method.file_name + ("-limits" if run.velocity_limits else "")
@@ -228,8 +238,11 @@ def _limits(choice: str, chain: sk.Chain) -> list[bool]:
 
 
 def _run_all(
-    experiment: ex.Experiment, methods: Sequence[ex.NamedMethod], limits: Sequence[bool]
-) -> list[ex.Run]:
+    experiment: ex.Experiment,
+    methods: Sequence[ex.NamedMethod],
+    limits: Sequence[bool],
+    run: Callable[[ex.NamedMethod, bool, Callable[[int], None]], AnyRun],
+) -> list[AnyRun]:
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -241,7 +254,7 @@ def _run_all(
         for held in limits:
             for method in methods:
                 progress.update(task, description=f"{method.label}{', speed limits on' if held else ''}")
-                runs.append(ex.run(experiment, method, held, lambda cycles: progress.advance(task, cycles)))
+                runs.append(run(method, held, lambda cycles: progress.advance(task, cycles)))
     return runs
 
 

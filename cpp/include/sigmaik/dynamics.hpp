@@ -1,8 +1,9 @@
 #pragma once
 /// \file dynamics.hpp
-/// Mass matrix, Coriolis and gravity torques of an arm, by KDL::ChainDynParam.
+/// Mass matrix, Coriolis and gravity torques of an arm with what it carries, by KDL's ChainDynParam and ChainIdSolver_RNE.
 
 #include <memory>
+#include <optional>
 
 #include <sigmaik/chain.hpp>
 
@@ -10,7 +11,7 @@ namespace sigmaik {
 
 /// M(q) and C(q, q̇) q̇ + g(q), without heap.
 struct DynamicsTerms {
-  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kMaxJoints, kMaxJoints> mass;  ///< (n, n)
+  JointMatrix mass;  ///< (n, n) [kg·m²]
   JointVector bias;  ///< (n,) [N·m or N]: the torque that gives no acceleration
 };
 
@@ -18,15 +19,26 @@ struct DynamicsTerms {
 class Dynamics {
  public:
   /// \param gravity [m/s²], in base axes
-  /// \throws Error where a movable joint carries no link whose inertia is known
-  explicit Dynamics(const Chain& chain, const Eigen::Vector3d& gravity = {0.0, 0.0, -9.80665});
+  /// \param payload what the tip carries: centre of mass in the tip's frame, tensor about it in the tip's axes
+  /// \throws Error where a movable joint carries no link whose inertia is known, where gravity is not finite, or where the
+  ///     payload is no body: a mass below 0, a tensor that is not symmetric, or a principal moment beyond the sum of the
+  ///     other two
+  explicit Dynamics(const Chain& chain, const Eigen::Vector3d& gravity = {0.0, 0.0, -9.80665},
+                    const std::optional<Inertia>& payload = std::nullopt);
   ~Dynamics();
   Dynamics(Dynamics&&) noexcept;
   Dynamics& operator=(Dynamics&&) noexcept;
 
   int dof() const noexcept;
-  /// Both terms at q, q̇ (n,), which must have that size and be finite. Real time.
+
+  // Real time: noexcept, no heap. Arguments (n,) must have that size and be finite.
+
+  /// M and C q̇ + g at q, q̇.
   void evaluate(const JointRef& q, const JointRef& qdot, DynamicsTerms& terms) noexcept;
+  /// τ = M q̈ + C q̇ + g, without M: one recursion of Newton and Euler.
+  void inverse_dynamics(const JointRef& q, const JointRef& qdot, const JointRef& qddot, JointVector& torque) noexcept;
+  /// q̈ = M⁻¹ (τ − C q̇ − g). False, and q̈ zero, where M is not positive definite: inertias that no body has.
+  bool forward_dynamics(const JointRef& q, const JointRef& qdot, const JointRef& torque, JointVector& qddot) noexcept;
 
   // These allocate, and are not for the loop.
 

@@ -24,4 +24,7 @@ Chain from_kdl(const KDL::Chain& chain, const std::string& base = "base");
 /// URDF. Limits are lost. Mind that KDL's joints cache their last pose: a KDL::Chain is not for two threads at once.
 KDL::Chain to_kdl(const Chain& chain);
 
+/// KDL keeps the tensor about the link frame's origin, Inertia about the centre of mass.
+KDL::RigidBodyInertia to_kdl(const Inertia& inertia);
+
 }  // namespace sigmaik

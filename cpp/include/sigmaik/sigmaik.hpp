@@ -23,7 +23,8 @@
 ///     servo_loop.hpp       ServoLoop: a servo in a thread of its own; stale commands stop the arm (not included)
 ///     target_stream.hpp    TargetStream: samples of a moving pose in, a smooth target out, each cycle
 ///     analytic_ik.hpp      AnalyticIk: every posture of a pose, for six joints with a spherical wrist
-///     dynamics.hpp         Dynamics: mass matrix, Coriolis, gravity, by KDL (not included)
+///     dynamics.hpp         Dynamics: mass matrix, Coriolis, gravity, payload, by KDL (not included)
+///     computed_torque.hpp  ComputedTorque: joint torques along a planned motion (not included)
 ///     constrained_ik.hpp   ConstrainedIk: a pose exactly in part, the rest as limits allow; time scaling (not included)
 ///     planning/time_optimal.hpp  TimeOptimal: motions within limits, away from what a cost marks (not included)
 ///     planning/support_states.hpp  SupportPlanner: smooth motions along which a cost is low, by gradient or samples

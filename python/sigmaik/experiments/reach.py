@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import pathlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,6 +40,12 @@ class Experiment:
     def cycles(self, segment: paths.Segment) -> int:
         """Number of control cycles in a segment, at least one."""
         return max(1, round(segment.duration * self.settings.rate))
+
+    def targets(self) -> Iterator[tuple[int, Array]]:
+        """For every control cycle its segment's index, and the target's pose (4, 4)."""
+        for i, segment in enumerate(self.path.segments):
+            for j in range(self.cycles(segment)):
+                yield i, segment.target(j / self.settings.rate) if segment.pose is None else segment.pose
 
 
 @dataclass(frozen=True)
@@ -193,19 +199,15 @@ def run(
     status, scale = np.empty(n, dtype=np.int8), np.empty(n)
 
     stride = max(1, round(s.rate / 10.0))
-    k = 0
     state = experiment.start
-    for i, segment in enumerate(experiment.path.segments):
-        for j in range(experiment.cycles(segment)):
-            pose = segment.target(j / s.rate) if segment.pose is None else segment.pose
-            step = servo.update(pose)
-            index[k], q[k], target[k] = i, state, pose[:3, 3]
-            state = step.q
-            qdot[k], error[k], scale[k] = step.qdot, step.pose_error, step.scale
-            singular_values[k], status[k] = step.singular_values, int(step.status)
-            k += 1
-            if progress is not None and k % stride == 0:
-                progress(stride)
+    for k, (i, pose) in enumerate(experiment.targets()):
+        step = servo.update(pose)
+        index[k], q[k], target[k] = i, state, pose[:3, 3]
+        state = step.q
+        qdot[k], error[k], scale[k] = step.qdot, step.pose_error, step.scale
+        singular_values[k], status[k] = step.singular_values, int(step.status)
+        if progress is not None and (k + 1) % stride == 0:
+            progress(stride)
     return Run(
         experiment, method, velocity_limits, t, index, q, qdot, target, error, singular_values, status, scale
     )
