@@ -64,7 +64,7 @@ def time_figure(runs: Sequence[Follow], by: Literal["method", "mode"]) -> Figure
 def path_figure(run: Follow) -> Figure:
     """The target, its samples and the tip, from above and from the side."""
     e = run.experiment
-    figure = Figure(figsize=(10.0, 5.2), layout="constrained")
+    figure = Figure(figsize=(10.0, 4.2), layout="constrained")
     FigureCanvasAgg(figure)
     panels: Any = figure.subplots(1, 2)
     figure.suptitle(f"{e.robot}, {e.target}: the way of the tip, {run.variant.label}", fontweight="bold")

@@ -111,8 +111,13 @@ def test_the_readmes_python():
             "twist": rng.normal(size=6),
             "start": sk.robots.home("franka_panda"),
             "goal": sk.robots.home("franka_panda") + 0.3,
+            "servo": sk.Servo(chain, sk.JParse()),
+            "stamp": 0.0,
+            "now": 0.02,
+            "pose": chain.pose(sk.robots.home("ufactory_xarm7")),
             "sk": sk,
         }
+        names["servo"].reset(names["q"])
         path = str(sk.robots.path("ufactory_xarm7"))
         code = single.replace('"arm.urdf", base="base_link", tip="tool0"', f'{path!r}, tip="flange"')
         exec(compile(code, "README.md", "exec"), names)

@@ -608,7 +608,7 @@ def _delay(run: Follow) -> float:
     lags = np.arange(-longest // 8, longest + 1)
     n = len(target)
     likeness = np.full(len(lags), -1.0)
-    for i, lag in enumerate(lags):
+    for i, lag in enumerate(lags.tolist()):
         a, b = max(0, -lag), min(n, n - lag)
         both = counts[a:b] & counts[a + lag : b + lag]
         x, y = target[a:b][both], tip[a + lag : b + lag][both]
