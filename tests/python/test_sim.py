@@ -212,7 +212,6 @@ def test_payload_unknown_and_known(panda, plan):
     assert known.max_error < 5e-4
     # At rest e = d/ω², M d the torque that is missing.
     end = plan.q[-1]
-    zero = np.zeros(7)
     loaded, bare = sk.Dynamics(arm, payload=load), sk.Dynamics(arm)
     q = unknown.q[-1]
     missing = np.linalg.solve(bare.mass_matrix(q), loaded.gravity(q) - bare.gravity(q))
@@ -220,7 +219,6 @@ def test_payload_unknown_and_known(panda, plan):
     assert unknown.final_error < unknown.max_error < 1.0
     assert np.abs(unknown.qdot[-1]).max() < 1e-2
     assert np.array_equal(unknown.planned[-1], end)
-    assert zero.shape == q.shape
 
 
 def test_saturation_is_told(panda, plan):
