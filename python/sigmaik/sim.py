@@ -172,7 +172,8 @@ class Simulation:
     def step(self, command: ArrayLike) -> Measurement:
         """Drives the joints by a command (n,) [rad/s, or N·m] for one control period; then measures.
 
-        Error where the command has a wrong size or is not finite, and where the motion is no longer finite.
+        Error where the command has a wrong size or is not finite, and where the motion is no longer finite. Of the latter
+        MuJoCo itself warns on stderr and in a file MUJOCO_LOG.TXT.
         """
         asked = self._sized(command, "the command")
         data = self.data

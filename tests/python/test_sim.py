@@ -212,7 +212,6 @@ def test_payload_unknown_and_known(panda, plan):
     assert known.max_error < 5e-4
     # At rest e = d/ω², M d the torque that is missing.
     end = plan.q[-1]
-    zero = np.zeros(7)
     loaded, bare = sk.Dynamics(arm, payload=load), sk.Dynamics(arm)
     q = unknown.q[-1]
     missing = np.linalg.solve(bare.mass_matrix(q), loaded.gravity(q) - bare.gravity(q))
@@ -220,7 +219,6 @@ def test_payload_unknown_and_known(panda, plan):
     assert unknown.final_error < unknown.max_error < 1.0
     assert np.abs(unknown.qdot[-1]).max() < 1e-2
     assert np.array_equal(unknown.planned[-1], end)
-    assert zero.shape == q.shape
 
 
 def test_saturation_is_told(panda, plan):
@@ -294,3 +292,159 @@ def test_the_extra_is_named(panda, monkeypatch):
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == "mujoco" else find(name))
     with pytest.raises(Exception, match=r"mujoco is not installed; pip install 'sigmaik\[sim\]' brings it"):
         Simulation(panda[0])
+
+
+# --- the reaching experiments
+
+
+@pytest.fixture(scope="module")
+def reaching():
+    """A second at a pose out of reach, and one at a pose well inside."""
+    from sigmaik import experiments as ex
+
+    arm = sk.robots.load("ufactory_xarm7")
+    start = np.array(ex.published("ufactory_xarm7").start)
+    far, near = arm.pose(start), arm.pose(start)
+    far[:3, 3] = (1.0, 0.0, 0.5)
+    near[:3, 3] += (0.05, 0.05, 0.05)
+    path = ex.Path("two", (ex.Segment.hold("near", near, 2.0), ex.Segment.hold("far", far, 1.0)))
+    return ex.load("ufactory_xarm7", path, start=tuple(start))
+
+
+@pytest.mark.parametrize("actuation", ["velocity", "torque"])
+@pytest.mark.parametrize("feedback", ["reference", "measured"])
+def test_reaching_in_physics(reaching, actuation, feedback):
+    from sigmaik import experiments as ex
+    from sigmaik.experiments import physics
+
+    method = ex.parse_method("jparse", reaching.settings)
+    settings = physics.PhysicsSettings(actuation=actuation, feedback=feedback)
+    run = physics.run_physics(reaching, method, True, settings)
+    # Without physics it is what `run` gives, to the last digit.
+    alone = ex.run(reaching, method, True)
+    assert np.array_equal(run.kinematic.q, alone.q)
+    near, far = physics.summarize_physics(run)
+    assert near.physical_position_error < 1e-3
+    assert near.physical_position_error == pytest.approx(near.position_error, abs=1e-3)
+    assert far.physical_position_error == pytest.approx(far.position_error, rel=0.05)
+    assert 0.0 < far.max_effort <= 1.0 + 1e-9
+    assert 1e-3 < far.max_tip_distance < 0.3
+    assert math.isnan(near.tripped)
+    again = physics.run_physics(reaching, method, True, settings)
+    assert np.array_equal(run.physical.q, again.physical.q)
+
+
+def test_the_measured_loop_is_the_servos_law(reaching):
+    # Perfect drives at the method's own rate: what is left is that they take time to follow.
+    from sigmaik import experiments as ex
+    from sigmaik.experiments.physics import _Measured
+    from sigmaik.sim import Measurement
+
+    for name in ("jparse", "dls", "pinv"):
+        method = ex.parse_method(name, reaching.settings)
+        for limits in (False, True):
+            loop = _Measured(reaching, method, limits)
+            run = ex.run(reaching, method, limits)
+            poses = [pose for _, pose in reaching.targets()]
+            for k in range(0, len(run.t), 7):
+                if not np.isfinite(run.q[k]).all() or np.abs(run.qdot[k]).max() > 100.0:
+                    continue
+                qdot, _, scale = loop.update(Measurement(0.0, run.q[k], np.zeros(7)), poses[k])
+                np.testing.assert_allclose(qdot, run.qdot[k], atol=1e-6 * (1.0 + np.abs(qdot).max()))
+                assert scale == pytest.approx(run.scale[k], abs=1e-6)
+
+
+def test_drives_trip(reaching):
+    from sigmaik import experiments as ex
+    from sigmaik.experiments import physics
+
+    method = ex.parse_method("jparse", reaching.settings)
+    run = physics.run_physics(reaching, method, False, physics.PhysicsSettings(trip=0.2))
+    assert run.tripped > 0.0
+    after = run.physical.t > run.tripped
+    assert np.array_equal(run.physical.q[after], np.broadcast_to(run.physical.q[-1], run.physical.q[after].shape))
+    assert not run.physical.qdot[after].any()
+    assert not run.effort[after].any()
+
+
+# --- the commands
+
+WAYPOINTS = "x,y,z,roll,pitch,yaw,duration\n0.4,0,0.4,3.14159265,0,0,1\n"
+
+
+@pytest.fixture
+def waypoints(tmp_path):
+    file = tmp_path / "way.csv"
+    file.write_text(WAYPOINTS)
+    return str(file)
+
+
+def test_reach_command(tmp_path, capsys, waypoints):
+    out = tmp_path / "out"
+    arguments = ["reach", "--path", waypoints, "--method", "jparse,dls", "--physics", "--out", str(out)]
+    assert main(arguments) == 0
+    printed = capsys.readouterr().out.splitlines()
+    assert printed[-1] == str(out / "ufactory_xarm7-way-velocity.png")
+    assert max(map(len, printed[:-3])) <= 80
+    assert (out / "ufactory_xarm7-way-velocity.png").stat().st_size > 10_000
+    assert len(list(out.glob("*.npz"))) == 8
+    with (out / "ufactory_xarm7-way-velocity.csv").open(newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    assert len(rows) == 4
+    assert all(float(row["max_tip_distance"]) > 0.0 for row in rows)
+    options = (
+        "--physics torque --feedback measured --friction 0.01 --payload 0.5 --noise 1e-4 --velocity-noise 1e-3 --delay 1 "
+        "--period 2e-3 --frequency 30 --seed 3 --method all --limits on --format none --no-plot"
+    )
+    assert main(["reach", "--path", waypoints, "--out", str(out), *options.split()]) == 0
+    captured = capsys.readouterr().out
+    assert "payload 0.5 kg" in captured
+    assert captured.splitlines()[-1] == str(out / "ufactory_xarm7-way-torque-measured.csv")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--robot", "kuka_kr6_r900", "--path", "WAYPOINTS"], "inertia"),
+        (["--friction", "-1"], "friction"),
+        (["--payload", "-1"], "payload"),
+        (["--noise", "-1"], "position_noise"),
+        (["--delay", "-1"], "delay"),
+        (["--period", "0.003"], "does not divide"),
+        (["--period", "0"], "timestep = 0"),
+        (["--frequency", "0", "--physics", "torque"], "frequency"),
+    ],
+)
+def test_reach_command_refuses(capsys, tmp_path, waypoints, arguments, message):
+    arguments = [waypoints if text == "WAYPOINTS" else text for text in arguments]
+    command = ["reach", "--method", "dls", "--no-plot", "--physics", "--out", str(tmp_path)]
+    assert main([*command, *arguments]) == 2
+    assert message in capsys.readouterr().err
+
+
+def test_execute_command(tmp_path, capsys, plan):
+    saved = plan.save(tmp_path / "plan.npz")
+    assert main(["execute", "--plan", str(saved), "--payload", "0.5", "--out", str(tmp_path)]) == 0
+    assert capsys.readouterr().out.splitlines()[-1] == str(tmp_path / "franka_panda-execute.png")
+    with (tmp_path / "franka_panda-execute.csv").open(newline="") as stream:
+        rows = {row["variant"]: row for row in csv.DictReader(stream)}
+    assert list(rows) == ["payload unknown", "payload known", "velocity loops"]
+    assert float(rows["payload known"]["max_error"]) < 1e-3 < float(rows["payload unknown"]["max_error"])
+    command = "execute --robot puma560 --motion 3 --pace 0.5 --no-plot --friction 0.01 --out"
+    assert main([*command.split(), str(tmp_path)]) == 0
+    assert capsys.readouterr().out.splitlines()[-1] == str(tmp_path / "puma560-execute.csv")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--robot", "kuka_kr6_r900"], "inertia"),
+        (["--pace", "0"], "--pace"),
+        (["--plan", "nothing.npz"], "nothing.npz"),
+        (["--motion", "-1"], "non-negative"),
+        (["--delay", "-2"], "delay"),
+    ],
+)
+def test_execute_command_refuses(capsys, tmp_path, arguments, message):
+    assert main(["execute", "--no-plot", "--out", str(tmp_path), *arguments]) == 2
+    assert message in capsys.readouterr().err

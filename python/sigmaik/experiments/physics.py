@@ -100,11 +100,13 @@ def run_physics(
     p = settings or PhysicsSettings()
     if p.feedback not in ("reference", "measured"):
         raise ValueError(f"feedback = {p.feedback!r} must be 'reference' or 'measured'")
+    if not p.trip > 0.0:
+        raise ValueError(f"trip = {p.trip} must be greater than 0")
     s, chain = experiment.settings, experiment.chain
+    arm = simulation(chain, p, p.actuation)
     substeps = round(1.0 / (s.rate * p.period))
     if substeps < 1 or abs(substeps * p.period * s.rate - 1.0) > 1e-9:
         raise ValueError(f"the drives' period of {p.period:g} s does not divide the cycle of {1.0 / s.rate:g} s")
-    arm = simulation(chain, p, p.actuation)
     control = sk.ComputedTorque(chain, frequency=p.frequency) if p.actuation == "torque" else None
     kinematic = reach.run(experiment, method, velocity_limits)
     loop = _Measured(experiment, method, velocity_limits) if p.feedback == "measured" else None
