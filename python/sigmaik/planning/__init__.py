@@ -22,6 +22,7 @@ from sigmaik._core import (
 )
 
 from .cart import CartError, CartMotion, CartRegion, cart_motion, evaluate_cart_motion
+from .cart_plane import PlaneCartMotion, cart_motion_plane, evaluate_cart_motion_plane
 from .cart_trajectory import CartTrajectory, ShoulderCylinder, cart_trajectory, shoulder_cylinder
 from .clearance import Clearance, Crossing
 from .collision import arm_spheres, collision_cost, min_distance
@@ -43,14 +44,17 @@ __all__ = [
     "DistanceField",
     "JointCost",
     "Obstacles",
+    "PlaneCartMotion",
     "ShoulderCylinder",
     "Sphere",
     "Trajectory",
     "arm_spheres",
     "cart_motion",
+    "cart_motion_plane",
     "cart_trajectory",
     "collision_cost",
     "evaluate_cart_motion",
+    "evaluate_cart_motion_plane",
     "gradient",
     "joint_limit_cost",
     "min_distance",
