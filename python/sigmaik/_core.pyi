@@ -7,7 +7,7 @@ import enum
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['AdaptiveDampedLeastSquares', 'AnalyticBranch', 'AnalyticIk', 'ArmSpheres', 'CartError', 'CartLaw', 'CartRegion', 'Chain', 'ConstrainedIk', 'ConstrainedIkStep', 'DEFAULT_SCALE', 'DampedLeastSquares', 'DistanceField', 'Dynamics', 'Error', 'JParse', 'JacobianProjection', 'JacobianSafety', 'JacobianSafetyProjection', 'JointCost', 'JointLimits', 'LeastSquaresSolution', 'PseudoInverse', 'SelectivelyDampedLeastSquares', 'Servo', 'ServoStep', 'SingularSets', 'Solution', 'Spectrum', 'Status', 'SupportPlanner', 'SupportStates', 'TimeOptimal', 'TimeOptimalResult', 'VelocitySolver', 'cart_descent', 'cart_law', 'collision_cost', 'evaluate_index', 'forbidden_intervals', 'geometry_aware_cost', 'index_of_jacobian', 'joint_limit_cost', 'known_singular_sets', 'least_squares', 'load_singular_sets', 'log_manipulability_cost', 'manipulability_cost', 'min_distance', 'pose_error', 'potential_cost', 'reference_scale', 'rotation_exp', 'rotation_log', 'self_collision_cost', 'self_collision_pairs', 'singular_sets_of', 'solve_batch', 'spline_velocities', 'sum_of_costs', 'taut_string']
+__all__: list[str] = ['AdaptiveDampedLeastSquares', 'AnalyticBranch', 'AnalyticIk', 'ArmSpheres', 'CartError', 'CartLaw', 'CartRegion', 'Chain', 'ConstrainedIk', 'ConstrainedIkStep', 'DEFAULT_SCALE', 'DampedLeastSquares', 'DistanceField', 'Dynamics', 'Error', 'JParse', 'JacobianProjection', 'JacobianSafety', 'JacobianSafetyProjection', 'JointCost', 'JointLimits', 'LeastSquaresSolution', 'PlaneCartLaw', 'PseudoInverse', 'SelectivelyDampedLeastSquares', 'Servo', 'ServoStep', 'SingularSets', 'Solution', 'Spectrum', 'Status', 'SupportPlanner', 'SupportStates', 'TimeOptimal', 'TimeOptimalResult', 'VelocitySolver', 'cart_descent', 'cart_law', 'collision_cost', 'evaluate_index', 'forbidden_intervals', 'geometry_aware_cost', 'index_of_jacobian', 'joint_limit_cost', 'known_singular_sets', 'least_squares', 'load_singular_sets', 'log_manipulability_cost', 'manipulability_cost', 'min_distance', 'plane_cart_law', 'pose_error', 'potential_cost', 'reference_scale', 'rotation_exp', 'rotation_log', 'self_collision_cost', 'self_collision_pairs', 'singular_sets_of', 'solve_batch', 'spline_velocities', 'sum_of_costs', 'taut_string']
 class Error(ValueError):
     """
     What set-up and checked calls refuse. The text carries the facts.
@@ -1075,6 +1075,40 @@ class CartLaw:
         """
         (M,) [m]
         """
+class PlaneCartLaw:
+    """
+    Answer of plane_cart_law().
+    """
+    @property
+    def c(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (M, 2) [m]
+        """
+    @property
+    def energy(self) -> float:
+        """
+        [m²] Σ |Δc|².
+        """
+    @property
+    def programs(self) -> int:
+        """
+        Quadratic programs solved.
+        """
+    @property
+    def push(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (M,) [m]
+        """
+    @property
+    def starts(self) -> int:
+        """
+        First guesses tried.
+        """
+    @property
+    def turn(self) -> float:
+        """
+        [rad] of the point's azimuth.
+        """
 class DistanceField:
     """
     Signed distances [m] to obstacles on a regular grid, interpolated trilinearly: positive in
@@ -1230,6 +1264,10 @@ def manipulability_cost(chain: Chain, weight: typing.SupportsFloat | typing.Supp
 def min_distance(spheres: ArmSpheres, field: DistanceField, q: numpy.typing.ArrayLike, threads: typing.SupportsInt | typing.SupportsIndex = 1) -> float | numpy.typing.NDArray[numpy.float64]:
     """
     The least signed distance [m] from a sphere that moves to the obstacles at q (n,), or (B,) at q (B, n).
+    """
+def plane_cart_law(flange_xy: numpy.typing.ArrayLike, start: numpy.typing.ArrayLike, end: numpy.typing.ArrayLike, radius: typing.SupportsFloat | typing.SupportsIndex, *, lower: numpy.typing.ArrayLike, upper: numpy.typing.ArrayLike, margin: typing.SupportsFloat | typing.SupportsIndex, max_radius: typing.SupportsFloat | typing.SupportsIndex, turn: typing.SupportsFloat | typing.SupportsIndex | None, duration: typing.SupportsFloat | typing.SupportsIndex, max_speed: numpy.typing.ArrayLike, max_acceleration: numpy.typing.ArrayLike, at_rest: bool) -> PlaneCartLaw:
+    """
+    The motion of a cart with two axes. `sigmaik.planning.cart_motion_plane` is what to call.
     """
 def pose_error(current: typing.Any, target: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
     """

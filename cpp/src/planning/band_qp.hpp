@@ -36,6 +36,7 @@ class BandQp {
     for (std::size_t i = 0; i + kStep < m; ++i) energy += square(x_[i + kStep] - x_[i]);
     if (!(energy > 0)) energy = 1;
     weight_ = 2 / energy;  // the objective is about 1
+    step_ = std::sqrt(energy / static_cast<Real>(m));
     start();
     if (bounds_.empty()) return true;
     int stuck = 0;
@@ -152,9 +153,9 @@ class BandQp {
     for (const Bound& b : bounds_) worst = std::max(worst, std::abs(b.residual));
     return worst;
   }
-  // Relative to what makes it up.
+  // Relative to what makes it up; where no bound matters, to a thousandth of a step.
   Real worst_gradient() const {
-    Real worst = 0, size = weight_ * 1e-12L;
+    Real worst = 0, size = 1e-3L * weight_ * step_;
     for (const Real v : slope_) worst = std::max(worst, std::abs(v));
     for (const Bound& b : bounds_) {
       const BandRow& r = rows_[static_cast<std::size_t>(b.row)];
@@ -240,7 +241,7 @@ class BandQp {
   std::array<bool, kAxes> pinned_;
   std::vector<Real> x_, dx_, slope_, right_;
   std::vector<Band> band_;
-  Real weight_ = 1;
+  Real weight_ = 1, step_ = 0;
 };
 
 }  // namespace sigmaik::planning

@@ -28,6 +28,9 @@ constexpr int kCoarsePrograms = 30;
 constexpr int kPrograms = 300;
 constexpr double kSettled = 1e-9;   // of the radius, by which the last program moved the cart
 constexpr double kTight = 1e-9;     // of the radius: what counts as on the border
+constexpr double kCopy = 1e-4;      // [rad] between tangents of the outer disc
+constexpr int kNearer = 5;          // programs towards a way within limits of a longer duration
+constexpr int kTightenings = 10;    // such durations
 constexpr double kLongest = 1e6;    // times the duration, where limits are too tight
 
 double cross(const Vector2d& a, const Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
@@ -201,6 +204,29 @@ class Planner {
     return true;
   }
 
+  // The exact laws of one axis, where the other can stand.
+  void along_one_axis(const PlanarPath& f, std::vector<PlanarPath>& guesses) const {
+    for (const int axis : {0, 1}) {
+      const int other = 1 - axis;
+      if (pinned(axis) || start_[other] != end_[other]) continue;
+      // Seen with x along the axis, y to its left.
+      const double sign = axis == 0 ? 1.0 : -1.0;
+      PlanarPath path(f.rows(), 2);
+      path.col(0) = f.col(axis);
+      path.col(1) = sign * (f.col(other).array() - start_[other]);
+      CartOptions options{.lower = options_.lower[axis], .upper = options_.upper[axis]};
+      options.turn = options_.turn;
+      try {
+        const CartLaw law = cart_law(path, start_[axis], end_[axis], r_, options);
+        PlanarPath c(f.rows(), 2);
+        c.col(axis) = law.x;
+        c.col(other).setConstant(start_[other]);
+        guesses.push_back(std::move(c));
+      } catch (const CartError&) {  // then it is no guess
+      }
+    }
+  }
+
   // Dynamic programming over places where each sample could be: the way of the least energy that leaps over no disc, for each
   // number of turns.
   std::vector<PlanarPath> walked(const PlanarPath& f, const std::vector<PlanarPath>& guesses) const {
@@ -287,6 +313,7 @@ class Planner {
         if (most < kInfinity) fixed.push_back({2 * i + axis, 2, {-1.0, 1.0, 0.0}, -most, most, 2});
       }
     }
+    std::vector<std::size_t> last_cut(static_cast<std::size_t>(m), std::numeric_limits<std::size_t>::max());
     std::vector<double> x(static_cast<std::size_t>(2 * m));
     for (int k = 0; k < programs; ++k) {
       rows = fixed;
@@ -296,19 +323,29 @@ class Planner {
         const Vector2d n = distance > 0.0 ? Vector2d(d / distance) : Vector2d(1.0, 0.0);
         const double offset = n.dot(f.row(i).transpose() - start_);
         rows.push_back({2 * i, 2, {n.x(), n.y(), 0.0}, r_ + offset, kInfinity});
-        // Tangents hold in the outer disc from outside: those that were needed stay.
+        // Tangents hold the outer disc in from outside: those that were needed stay, but for near copies.
         if (distance > options_.max_radius * (1.0 - kTight)) {
-          cuts.push_back({2 * i, 2, {n.x(), n.y(), 0.0}, -kInfinity, options_.max_radius + offset});
+          const BandRow cut{2 * i, 2, {n.x(), n.y(), 0.0}, -kInfinity, options_.max_radius + offset};
+          std::size_t& last = last_cut[static_cast<std::size_t>(i)];
+          if (last < cuts.size() && std::abs(cuts[last].c[0] * n.y() - cuts[last].c[1] * n.x()) < kCopy) {
+            cuts[last] = cut;
+          } else {
+            last = cuts.size();
+            cuts.push_back(cut);
+          }
         }
       }
       rows.insert(rows.end(), cuts.begin(), cuts.end());
       Eigen::Map<PlanarPath> moved(x.data(), m, 2);
       moved = c.rowwise() - start_.transpose();
       ++programs_;
-      if (!BandQp<2>(rows, {pinned(0), pinned(1)}).solve(x)) return false;
+      // Once one is solved its answer keeps everything, and all that is lost is the rest of the way down.
+      if (!BandQp<2>(rows, {pinned(0), pinned(1)}).solve(x)) return k > 0 && reaches(f, c);
       moved.rowwise() += start_.transpose();
       const double step = (moved - c).cwiseAbs().maxCoeff();
       c = moved;
+      c.row(0) = start_;
+      c.row(m - 1) = end_;
       if (step < settled * r_ && reaches(f, c)) break;
     }
     return true;
@@ -333,6 +370,7 @@ class Planner {
       guesses.push_back(shortest(a, b, nearest + whole + 2.0 * kPi * more, r_, m) + f);
     }
     double least = kInfinity;
+    along_one_axis(f, guesses);
     for (PlanarPath& c : walked(f, guesses)) guesses.push_back(std::move(c));
     for (PlanarPath& c : guesses) {
       if (!turns_as_asked(c - f) || !put_all(f, c) || leap(c - f) || !turns_as_asked(c - f)) continue;
@@ -480,28 +518,41 @@ PlaneCartLaw plane_cart_law(const PlanarPath& path, const Vector2d& start, const
     return Limits{longer * dt * options.max_speed, longer * dt * longer * dt * options.max_acceleration};
   };
   if (!keeps(law.c, limits(1.0), options.at_rest)) {
-    const PlanarPath free = law.c;
-    const auto within = [&](double longer, int programs) {
-      law.c = free;
+    // Into law.c: within the limits of a duration so many times as long, by way of `from`.
+    const auto within = [&](double longer, const PlanarPath& from, int programs) {
+      law.c = from;
       Limits inside = limits(longer);
       inside.speed *= 1.0 - 1e-9;
       inside.acceleration *= 1.0 - 1e-9;
       return planner.improve(path, law.c, programs, kSettled, inside);
     };
-    if (!within(1.0, kPrograms)) {
+    PlanarPath way = law.c;
+    const bool slow = !keeps(way, {limits(1.0).speed}, false);
+    bool done = within(1.0, way, kPrograms);
+    if (!done) {
+      // The half-planes of a way that takes its limits into account leave more room: down to them from a longer duration.
       double good = 2.0, bad = 1.0;
-      while (good < kLongest && !within(good, 1)) {
+      while (good < kLongest && !within(good, way, kNearer)) {
         bad = good;
         good *= 2.0;
       }
-      for (int i = 0; i < 5 && good < kLongest; ++i) {
-        const double middle = 0.5 * (good + bad);
-        (within(middle, 1) ? good : bad) = middle;
+      for (int k = 0; k < kTightenings && good < kLongest && !done; ++k) {
+        if (k > 0 || bad > 1.0) {
+          const double middle = 0.5 * (bad + good);
+          if (!within(middle, way, kNearer)) {
+            bad = middle;
+            continue;
+          }
+          good = middle;
+        }
+        way = law.c;
+        done = within(1.0, way, kPrograms);
       }
-      const bool slow = !keeps(free, {limits(1.0).speed}, false);
-      refuse(slow ? CartFault::Speed : CartFault::Acceleration, kNaN,
-             message("along the best way without limits none keeps to them",
-                     good < kLongest ? message("; a duration of ", good * options.duration, " s would do") : ""));
+      if (!done) {
+        refuse(slow ? CartFault::Speed : CartFault::Acceleration, kNaN,
+               message("along the best way without limits none was found that keeps to them",
+                       good < kLongest ? message("; a duration of ", good * options.duration, " s would do") : ""));
+      }
     }
   }
   const PlanarPath d = law.c - path;
