@@ -6,6 +6,7 @@
     trajectory.clearance.min_manipulability, trajectory.clearance.crossings
     motion = sk.planning.cart_motion(flange_xy, start, end, radius)   # of the cart under an arm
     motion.x, motion.energy, motion.clearance
+    motion = sk.planning.cart_motion_plane(flange_xy, (0, 0), (1, 0), radius)   # with two axes
     obstacles = sk.planning.Obstacles([sk.planning.Box(size=(0.8, 1.2, 0.04), pose=(0.6, 0.0, 0.4))])
     spheres = sk.planning.arm_spheres(chain, "arm.urdf")
     sk.planning.min_distance(spheres, obstacles, trajectory.q)

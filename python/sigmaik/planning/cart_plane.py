@@ -55,6 +55,11 @@ class PlaneCartMotion:
     """Quadratic programs solved."""
 
     @property
+    def time_inside(self) -> float:
+        """[s] of the samples within the radius."""
+        return self.inside * self.duration / (len(self.xy) - 1)
+
+    @property
     def t(self) -> Array:
         """(M,) [s] of the samples."""
         return np.linspace(0.0, self.duration, len(self.xy))
@@ -136,8 +141,9 @@ def cart_motion_plane(
     ------
     CartError
         A ValueError: `reason` is "start inside", "end inside", "range", "winding", "speed" or "acceleration".
+        "range" and "winding" also where the path has so few samples that steps leap over the disc; the text tells.
     ValueError
-        where an argument is out of its range, or the path has so few samples that a step would leap over the disc.
+        where an argument is out of its range.
     """
     law = _core.plane_cart_law(
         flange_xy,
