@@ -1,4 +1,5 @@
 #include <sigmaik/planning/cart.hpp>
+#include <sigmaik/planning/cart_plane.hpp>
 
 #include "arguments.hpp"
 
@@ -10,6 +11,8 @@ using planning::CartLaw;
 using planning::CartOptions;
 using planning::CartRegion;
 using planning::PlanarPath;
+using planning::PlaneCartLaw;
+using planning::PlaneCartOptions;
 
 using Vectors = py::typing::Tuple<py::array_t<double>, py::array_t<double>>;
 
@@ -24,6 +27,13 @@ Eigen::VectorXd bounds_argument(py::handle object, const char* what) {
   if (!array) PyErr_Clear();
   if (!array || array.ndim() != 1) throw Error(std::string(what) + " must be numbers of shape (N,)");
   return Eigen::Map<const Eigen::VectorXd>(array.data(), array.shape(0));
+}
+
+// (2,) of the two axes, with infinities where a limit may be.
+Eigen::Vector2d axes_argument(py::handle object, const char* what) {
+  const Eigen::VectorXd values = bounds_argument(object, what);
+  if (values.size() != 2) throw Error(std::string(what) + " must be numbers of shape (2,)");
+  return values;
 }
 
 }  // namespace
@@ -75,6 +85,38 @@ void bind_cart(py::module_& m) {
       py::arg("flange_xy"), py::arg("start"), py::arg("end"), py::arg("radius"), py::kw_only(), py::arg("lower"),
       py::arg("upper"), py::arg("margin"), py::arg("turn"), py::arg("duration"), py::arg("max_speed"),
       py::arg("max_acceleration"), py::arg("at_rest"), "The cart's law of the least energy. `sigmaik.planning.cart_motion` is what to call.");
+  py::class_<PlaneCartLaw>(m, "PlaneCartLaw", "Answer of plane_cart_law().")
+      .def_property_readonly("c", [](const PlaneCartLaw& law) { return to_numpy(law.c); }, "(M, 2) [m]")
+      .def_property_readonly("push", [](const PlaneCartLaw& law) { return to_numpy(law.push); }, "(M,) [m]")
+      .def_readonly("energy", &PlaneCartLaw::energy, "[m²] Σ |Δc|².")
+      .def_readonly("turn", &PlaneCartLaw::turn, "[rad] of the point's azimuth.")
+      .def_readonly("starts", &PlaneCartLaw::starts, "First guesses tried.")
+      .def_readonly("programs", &PlaneCartLaw::programs, "Quadratic programs solved.");
+
+  m.def(
+      "plane_cart_law",
+      [](const ArrayLike& flange_xy, const ArrayLike& start, const ArrayLike& end, double radius, const ArrayLike& lower,
+         const ArrayLike& upper, double margin, double max_radius, std::optional<double> turn, double duration,
+         const ArrayLike& max_speed, const ArrayLike& max_acceleration, bool at_rest) {
+        const PlanarPath path = path_argument(flange_xy);
+        const Eigen::Vector2d from = axes_argument(start, "start"), to = axes_argument(end, "end");
+        PlaneCartOptions options;
+        options.lower = axes_argument(lower, "lower");
+        options.upper = axes_argument(upper, "upper");
+        options.margin = margin;
+        options.max_radius = max_radius;
+        options.turn = turn;
+        options.duration = duration;
+        options.max_speed = axes_argument(max_speed, "max_speed");
+        options.max_acceleration = axes_argument(max_acceleration, "max_acceleration");
+        options.at_rest = at_rest;
+        py::gil_scoped_release release;
+        return planning::plane_cart_law(path, from, to, radius, options);
+      },
+      py::arg("flange_xy"), py::arg("start"), py::arg("end"), py::arg("radius"), py::kw_only(), py::arg("lower"),
+      py::arg("upper"), py::arg("margin"), py::arg("max_radius"), py::arg("turn"), py::arg("duration"), py::arg("max_speed"),
+      py::arg("max_acceleration"), py::arg("at_rest"),
+      "The motion of a cart with two axes. `sigmaik.planning.cart_motion_plane` is what to call.");
   m.def(
       "forbidden_intervals",
       [](const ArrayLike& flange_xy, double radius) -> Vectors {

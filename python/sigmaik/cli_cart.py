@@ -15,7 +15,7 @@ __all__ = ["add_cart"]
 def add_cart(parser: argparse.ArgumentParser) -> None:
     parser.description = (
         "A UR10 on a cart passes its shoulder singularity (Salvato et al. 2022): the cart driven linearly, by a redundancy "
-        "scheme, by the paper's gradient descent, and by the exact law. Prints who crosses the forbidden region and who misses "
+        "scheme, by the paper's gradient descent, and by the exact law, along one axis and in the plane. Prints who crosses the forbidden region and who misses "
         "the taught joints, and draws the paper's figures 3 to 9. The last line on stdout is the last file."
     )
     parser.add_argument(
@@ -70,6 +70,10 @@ def _cart(arguments: argparse.Namespace) -> int:
             laws = plots_cart.laws_figure(experiment, runs, *stages)
             joints = plots_cart.joints_figure(experiment, runs)
             print(f"picture: {plots.save_figure(laws, arguments.out / f'cart-{variant}-laws.png')}")
+            exact = [run for run in runs if run.method in ("exact", "plane")]
+            if len(exact) == 2:
+                plane = plots_cart.plane_figure(experiment, exact)
+                print(f"picture: {plots.save_figure(plane, arguments.out / f'cart-{variant}-plane.png')}")
             last = plots.save_figure(joints, arguments.out / f"cart-{variant}-joints.png")
         print(last)
     return 0

@@ -9,9 +9,11 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from .experiments.cart import METHODS, Array, CartExperiment, CartRun, density
+from . import _core
+from .experiments.cart import METHODS, Array, CartExperiment, CartRun, cart_xy, density
+from .planning.cart import CartMotion
 
-__all__ = ["joints_figure", "laws_figure"]
+__all__ = ["joints_figure", "laws_figure", "plane_figure"]
 
 # Okabe and Ito's colours.
 _JOINT_COLOURS = ("#000000", "#E69F00", "#56B4E9", "#009E73", "#F0E442", "#0072B2", "#D55E00")
@@ -30,9 +32,8 @@ def laws_figure(
     FigureCanvasAgg(figure)
     figure.suptitle(f"cart, {e.variant}", fontsize=12, fontweight="bold")
     panels = figure.subplots(2, 4).ravel()
-    laws = {run.method: run.motion for run in runs}
-    some = next(iter(laws.values()))
-    lower, upper = some.lower, some.upper
+    laws = {run.method: run.motion for run in runs if isinstance(run.motion, CartMotion)}
+    lower, upper = _core.forbidden_intervals(e.flange_xy, e.radius)
 
     for panel, title, stages in (
         (panels[0], "gradient, linear guess (figure 3)", linear),
@@ -92,6 +93,46 @@ def joints_figure(e: CartExperiment, runs: Sequence[CartRun]) -> Figure:
     panels[0].set_ylim(-2.6, 2.6)
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncol=7, fontsize=8, frameon=False)
+    return figure
+
+
+def plane_figure(e: CartExperiment, runs: Sequence[CartRun]) -> Figure:
+    """Carts of one axis and of two from above: with the flange, seen from it, and both coordinates over time."""
+    figure = Figure(figsize=(13.0, 4.6), layout="constrained")
+    FigureCanvasAgg(figure)
+    figure.suptitle(f"cart with one axis and with two, {e.variant}", fontsize=12, fontweight="bold")
+    above, seen, over_time = figure.subplots(1, 3)
+    f = e.flange_xy
+    angle = np.linspace(0.0, 2.0 * np.pi, 181)
+    circle = e.radius * np.column_stack([np.cos(angle), np.sin(angle)])
+    some = np.linspace(0, e.samples - 1, 6).astype(int)
+    above.plot(*f.T, color="black", linewidth=1.2, label="flange")
+    for i in some:
+        above.plot(*(f[i] + circle).T, color="#B98B52", linewidth=0.7, label="radius about it" if i == 0 else None)
+    seen.fill(*circle.T, color=_REGION, label="forbidden")
+    t = e.s * e.duration
+    for run, colour in zip(runs, ("#0072B2", _LAW), strict=True):
+        c = cart_xy(run.motion)
+        above.plot(*c.T, color=colour, linewidth=1.8, label=METHODS[run.method])
+        above.plot(*c[some].T, "o", color=colour, markersize=4)
+        # The two can be one curve, run through at different speeds.
+        style = "--" if run.method == "plane" else "-"
+        seen.plot(*(c - f).T, color=colour, linewidth=1.8, linestyle=style, label=METHODS[run.method])
+        over_time.plot(t, c[:, 0], color=colour, linewidth=1.8, label=f"x, {METHODS[run.method]}")
+        if np.any(c[:, 1]):
+            over_time.plot(t, c[:, 1], color=colour, linewidth=1.8, linestyle="--", label=f"y, {METHODS[run.method]}")
+    above.set_title("from above; dots and circles at six times", fontsize=10)
+    seen.set_title("cart as seen from the flange", fontsize=10)
+    over_time.set_title("over time", fontsize=10)
+    for panel in (above, seen):
+        panel.set_aspect("equal")
+        panel.set_xlabel("x [m]")
+        panel.set_ylabel("y [m]")
+    over_time.set_xlabel("t [s]")
+    over_time.set_ylabel("cart [m]")
+    for panel in (above, seen, over_time):
+        panel.grid(alpha=0.3)
+        panel.legend(fontsize=7, loc="best")
     return figure
 
 

@@ -510,12 +510,15 @@ def test_command(tmp_path, capsys):
     lines = capsys.readouterr().out.strip().splitlines()
     assert lines[-1] == str(tmp_path / "cart-paper-joints.png")
     for variant in cart.VARIANTS:
-        for name in ("laws", "joints"):
+        for name in ("laws", "plane", "joints"):
             assert (tmp_path / f"cart-{variant}-{name}.png").stat().st_size > 10_000
         with (tmp_path / f"cart-{variant}.csv").open() as stream:
             rows = {row["method"]: row for row in csv.DictReader(stream)}
         assert list(rows) == list(cart.METHODS)
         assert float(rows["exact"]["followed"]) == 1.0
+        assert float(rows["plane"]["followed"]) == 1.0
+        assert int(rows["plane"]["inside"]) == 0
+        assert float(rows["plane"]["energy"]) < float(rows["exact"]["energy"])
         assert int(rows["exact"]["inside"]) == 0
         assert int(rows["linear"]["inside"]) > 0
     assert main(["cart", "--variant", "fk", "--method", "exact", "--samples", "100", "--no-plot", "--out", str(tmp_path)]) == 0

@@ -30,6 +30,7 @@
 ///     planning/support_states.hpp  SupportPlanner: smooth motions along which a cost is low, by gradient or samples
 ///     planning/costs.hpp         costs for both: potentials, manipulability, geometry-aware index (not included)
 ///     planning/cart.hpp          cart_law: where to drive the cart of a cart-mounted arm, clear of a cylinder (not included)
+///     planning/cart_plane.hpp    plane_cart_law: the same with two linear axes (not included)
 ///     planning/distance_field.hpp   DistanceField: signed distances to obstacles on a grid (not included)
 ///     planning/arm_spheres.hpp      ArmSpheres: an arm as spheres, from a URDF's shapes or along its links (not included)
 ///     planning/collision_costs.hpp  costs of obstacles, the arm itself, joint limits; min_distance (not included)

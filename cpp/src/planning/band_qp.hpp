@@ -1,7 +1,8 @@
 #pragma once
-// min Σ_i (x_{i+1} − x_i)² between given ends, under bounds on combinations of up to three neighbours, in O(M) a step: a
-// primal-dual interior-point method after Mehrotra, whose normal matrix has five diagonals. In long double: rows of second
-// differences make fourth differences, whose condition is (M/π)⁴, 10¹³ for 5000 samples.
+// min Σ_i |x_{i+1} − x_i|² between given ends, x of one or more axes, under bounds on combinations of up to three entries, in
+// O(M) a step: a primal-dual interior-point method after Mehrotra, whose normal matrix has four diagonals for each axis beside
+// the main one. In long double: rows of second differences make fourth differences, whose condition is (M/π)⁴, 10¹³ for 5000
+// samples.
 
 #include <algorithm>
 #include <array>
@@ -12,25 +13,30 @@
 
 namespace sigmaik::planning {
 
-// lower ≤ Σ_k c_k x_{first + k} ≤ upper, either may be infinite.
+// lower ≤ Σ_k c_k x_{first + k stride} ≤ upper, either may be infinite. It spans at most three samples.
 struct BandRow {
   int first, count;
   std::array<double, 3> c;
   double lower, upper;
+  int stride = 1;
 };
 
+// Samples of kAxes entries each, one after the other.
+template <int kAxes>
 class BandQp {
  public:
-  explicit BandQp(std::vector<BandRow> rows) : rows_(std::move(rows)) {}
+  // pinned: axes that stay where the guess has them.
+  explicit BandQp(std::vector<BandRow> rows, std::array<bool, kAxes> pinned = {}) : rows_(std::move(rows)), pinned_(pinned) {}
 
-  // From a guess x (M ≥ 3), whose ends stay. False where no x within the bounds was found; x is then of no use.
+  // From a guess x (M ≥ 3 samples), whose ends stay. False where no x within the bounds was found; x is then of no use.
   bool solve(std::vector<double>& x) {
     const std::size_t m = x.size();
     x_.assign(x.begin(), x.end());
     Real energy = 0;
-    for (std::size_t i = 0; i + 1 < m; ++i) energy += square(x_[i + 1] - x_[i]);
+    for (std::size_t i = 0; i + kStep < m; ++i) energy += square(x_[i + kStep] - x_[i]);
     if (!(energy > 0)) energy = 1;
     weight_ = 2 / energy;  // the objective is about 1
+    step_ = std::sqrt(energy / static_cast<Real>(m));
     start();
     if (bounds_.empty()) return true;
     int stuck = 0;
@@ -66,6 +72,10 @@ class BandQp {
  private:
   using Real = long double;
   static constexpr int kIterations = 60;
+  static constexpr std::size_t kStep = kAxes;      // from a sample to the next
+  static constexpr std::size_t kBand = 2 * kAxes;  // diagonals beside the main one
+
+  using Band = std::array<Real, kBand + 1>;
 
   // sign · (row − limit) = s > 0, times `scale`.
   struct Bound {
@@ -79,9 +89,18 @@ class BandQp {
   Real value(const BandRow& r, const std::vector<Real>& v) const {
     Real sum = 0;
     for (int k = 0; k < r.count; ++k) {
-      sum += static_cast<Real>(r.c[static_cast<std::size_t>(k)]) * v[static_cast<std::size_t>(r.first + k)];
+      sum += static_cast<Real>(r.c[static_cast<std::size_t>(k)]) * v[static_cast<std::size_t>(r.first + k * r.stride)];
     }
     return sum;
+  }
+
+  // The ends, and axes that are pinned.
+  bool fixed(std::size_t i) const { return i < kStep || i + kStep >= x_.size() || pinned_[i % kStep]; }
+
+  void hold_fixed(std::vector<Real>& v) const {
+    for (std::size_t i = 0; i < v.size(); ++i) {
+      if (fixed(i)) v[i] = 0;
+    }
   }
 
   // Bounds scaled so that what they allow, or what is there, is about 1; slacks away from 0.
@@ -102,24 +121,25 @@ class BandQp {
       if (std::isfinite(r.lower)) add(1, r.lower);
       if (std::isfinite(r.upper)) add(-1, r.upper);
     }
-    for (auto* v : {&dx_, &slope_, &right_, &d0_, &d1_, &d2_}) v->assign(x_.size(), 0);
+    for (auto* v : {&dx_, &slope_, &right_}) v->assign(x_.size(), 0);
+    band_.assign(x_.size(), {});
   }
 
   // Of the Lagrangian, into slope_; and what the bounds are off by.
   void gradient() {
     const std::size_t m = x_.size();
-    for (std::size_t i = 1; i + 1 < m; ++i) slope_[i] = weight_ * (2 * x_[i] - x_[i - 1] - x_[i + 1]);
+    for (std::size_t i = kStep; i + kStep < m; ++i) slope_[i] = weight_ * (2 * x_[i] - x_[i - kStep] - x_[i + kStep]);
     for (Bound& b : bounds_) {
       const BandRow& r = rows_[static_cast<std::size_t>(b.row)];
       b.residual = b.sign * b.scale * (value(r, x_) - b.limit) - b.s;
       scatter(r, -b.sign * b.scale * b.z, slope_);
     }
-    slope_.front() = slope_.back() = 0;
+    hold_fixed(slope_);
   }
 
   static void scatter(const BandRow& r, Real factor, std::vector<Real>& to) {
     for (int k = 0; k < r.count; ++k) {
-      to[static_cast<std::size_t>(r.first + k)] += factor * static_cast<Real>(r.c[static_cast<std::size_t>(k)]);
+      to[static_cast<std::size_t>(r.first + k * r.stride)] += factor * static_cast<Real>(r.c[static_cast<std::size_t>(k)]);
     }
   }
 
@@ -133,50 +153,52 @@ class BandQp {
     for (const Bound& b : bounds_) worst = std::max(worst, std::abs(b.residual));
     return worst;
   }
-  // Relative to what makes it up.
+  // Relative to what makes it up; where no bound matters, to a thousandth of a step.
   Real worst_gradient() const {
-    Real worst = 0, size = weight_ * 1e-12L;
+    Real worst = 0, size = 1e-3L * weight_ * step_;
     for (const Real v : slope_) worst = std::max(worst, std::abs(v));
     for (const Bound& b : bounds_) {
       const BandRow& r = rows_[static_cast<std::size_t>(b.row)];
-      size = std::max(size, b.scale * b.z * std::abs(static_cast<Real>(r.c[0])));
+      for (int k = 0; k < r.count; ++k) {
+        size = std::max(size, b.scale * b.z * std::abs(static_cast<Real>(r.c[static_cast<std::size_t>(k)])));
+      }
     }
     return worst / size;
   }
 
-  // K = LDLᵀ with the diagonals d0_, d1_, d2_; the ends are fixed.
+  // K = LDLᵀ, with row i of the upper half in band_[i].
   bool factor() {
     const std::size_t m = x_.size();
-    for (std::size_t i = 0; i < m; ++i) {
-      d0_[i] = 2 * weight_;
-      d1_[i] = -weight_;
-      d2_[i] = 0;
+    for (Band& b : band_) {
+      b = {};
+      b[0] = 2 * weight_;
+      b[kStep] = -weight_;
     }
     for (const Bound& b : bounds_) {
       const BandRow& r = rows_[static_cast<std::size_t>(b.row)];
       const Real w = square(b.scale) * b.z / b.s;
       for (int k = 0; k < r.count; ++k) {
-        const auto i = static_cast<std::size_t>(r.first + k);
+        const auto i = static_cast<std::size_t>(r.first + k * r.stride);
         const Real wc = w * static_cast<Real>(r.c[static_cast<std::size_t>(k)]);
-        d0_[i] += wc * static_cast<Real>(r.c[static_cast<std::size_t>(k)]);
-        if (k + 1 < r.count) d1_[i] += wc * static_cast<Real>(r.c[static_cast<std::size_t>(k + 1)]);
-        if (k + 2 < r.count) d2_[i] += wc * static_cast<Real>(r.c[static_cast<std::size_t>(k + 2)]);
+        for (int l = k; l < r.count; ++l) {
+          band_[i][static_cast<std::size_t>((l - k) * r.stride)] += wc * static_cast<Real>(r.c[static_cast<std::size_t>(l)]);
+        }
       }
     }
-    d0_[0] = d0_[m - 1] = 1;
-    d1_[0] = d2_[0] = d1_[m - 2] = d2_[m - 3] = 0;
     for (std::size_t i = 0; i < m; ++i) {
-      if (!(d0_[i] > 0)) return false;
-      if (i + 1 < m) {
-        const Real l1 = d1_[i] / d0_[i], l2 = i + 2 < m ? d2_[i] / d0_[i] : 0;
-        d0_[i + 1] -= l1 * d1_[i];
-        if (i + 2 < m) {
-          d1_[i + 1] -= l1 * d2_[i];
-          d0_[i + 2] -= l2 * d2_[i];
-        }
-        d1_[i] = l1;
-        d2_[i] = l2;
+      for (std::size_t a = 1; a <= kBand; ++a) {
+        if (fixed(i) || i + a >= m || fixed(i + a)) band_[i][a] = 0;
       }
+      if (fixed(i)) band_[i][0] = 1;
+    }
+    for (std::size_t i = 0; i < m; ++i) {
+      Band& row = band_[i];
+      if (!(row[0] > 0)) return false;
+      for (std::size_t a = 1; a <= kBand && i + a < m; ++a) {
+        const Real l = row[a] / row[0];
+        for (std::size_t b = a; b <= kBand && i + b < m; ++b) band_[i + a][b - a] -= l * row[b];
+      }
+      for (std::size_t a = 1; a <= kBand; ++a) row[a] /= row[0];
     }
     return true;
   }
@@ -189,16 +211,14 @@ class BandQp {
       const Real push = (target - (corrected ? b.cross : 0)) / b.s - b.z - b.z / b.s * b.residual;
       scatter(rows_[static_cast<std::size_t>(b.row)], b.sign * b.scale * push, right_);
     }
-    right_.front() = right_.back() = 0;
+    hold_fixed(right_);
     for (std::size_t i = 0; i < m; ++i) {
       dx_[i] = right_[i];
-      if (i > 0) dx_[i] -= d1_[i - 1] * dx_[i - 1];
-      if (i > 1) dx_[i] -= d2_[i - 2] * dx_[i - 2];
+      for (std::size_t a = 1; a <= kBand && a <= i; ++a) dx_[i] -= band_[i - a][a] * dx_[i - a];
     }
     for (std::size_t i = m; i-- > 0;) {
-      dx_[i] /= d0_[i];
-      if (i + 1 < m) dx_[i] -= d1_[i] * dx_[i + 1];
-      if (i + 2 < m) dx_[i] -= d2_[i] * dx_[i + 2];
+      dx_[i] /= band_[i][0];
+      for (std::size_t a = 1; a <= kBand && i + a < m; ++a) dx_[i] -= band_[i][a] * dx_[i + a];
     }
     for (Bound& b : bounds_) {
       const Real moved = b.sign * b.scale * value(rows_[static_cast<std::size_t>(b.row)], dx_);
@@ -218,8 +238,10 @@ class BandQp {
 
   std::vector<BandRow> rows_;
   std::vector<Bound> bounds_;
-  std::vector<Real> x_, dx_, slope_, right_, d0_, d1_, d2_;
-  Real weight_ = 1;
+  std::array<bool, kAxes> pinned_;
+  std::vector<Real> x_, dx_, slope_, right_;
+  std::vector<Band> band_;
+  Real weight_ = 1, step_ = 0;
 };
 
 }  // namespace sigmaik::planning

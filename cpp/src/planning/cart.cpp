@@ -473,7 +473,7 @@ bool accelerate(const PlanarPath& path, double r, const CartOptions& options, do
     if (most < kInfinity) rows.push_back({i, 2, {-1.0, 1.0, 0.0}, -most, most});
   }
   std::vector<double> x(law.x.data(), law.x.data() + m);
-  if (!BandQp(std::move(rows)).solve(x)) return false;
+  if (!BandQp<1>(std::move(rows)).solve(x)) return false;
   law.x = Eigen::Map<const VectorXd>(x.data(), m);
   law.energy = (law.x.tail(m - 1) - law.x.head(m - 1)).squaredNorm();
   law.multipliers.segment(1, m - 2) = 2.0 * law.x.segment(1, m - 2) - law.x.head(m - 2) - law.x.tail(m - 2);

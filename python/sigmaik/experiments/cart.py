@@ -1,4 +1,4 @@
-"""A UR10 on a cart by its shoulder singularity (Salvato et al. 2022, section 4): four ways to drive the cart.
+"""A UR10 on a cart by its shoulder singularity (Salvato et al. 2022, section 4): the ways to drive the cart.
 
 Two variants, as no mounting of a UR10 makes the paper's joints give the paper's poses:
 
@@ -21,10 +21,11 @@ from numpy.typing import NDArray
 import sigmaik as sk
 from sigmaik import _core
 from sigmaik.planning.cart import PUBLISHED_ITERATIONS, CartMotion, cart_motion, evaluate_cart_motion
+from sigmaik.planning.cart_plane import PlaneCartMotion, cart_motion_plane
 from sigmaik.planning.cart_path import PosePath, pose_paths
 from sigmaik.planning.cart_trajectory import follow
 
-__all__ = ["METHODS", "VARIANTS", "CartExperiment", "CartRun", "density", "descent", "experiment", "run"]
+__all__ = ["METHODS", "VARIANTS", "CartExperiment", "CartRun", "cart_xy", "density", "descent", "experiment", "run"]
 
 Array = NDArray[np.float64]
 
@@ -35,6 +36,7 @@ METHODS = {
     "gradient": "gradient, linear guess",
     "gradient-admissible": "gradient, admissible guess",
     "exact": "exact",
+    "plane": "exact, two axes",
 }
 
 _JOINTS = (-1.235, -1.7272, 0.7, -1.0, 1.5951, -0.0311)
@@ -113,9 +115,9 @@ class CartRun:
     """One way to drive the cart, and what the arm makes of it."""
 
     method: str
-    motion: CartMotion = field(repr=False)
+    motion: CartMotion | PlaneCartMotion = field(repr=False)
     q: Array = field(repr=False)
-    """(K, 7) cart [m] and joints [rad], of the K ≤ M samples that the arm can follow."""
+    """(K, 7) cart [m], along x, and joints [rad], of the K ≤ M samples that the arm can follow."""
     joint_error: Array = field(repr=False)
     """(7,) last configuration less the taught one; nan where the arm does not get there."""
     task_error: float
@@ -128,7 +130,7 @@ class CartRun:
     @property
     def followed(self) -> float:
         """Part of the samples that the arm can follow."""
-        return len(self.q) / len(self.motion.x)
+        return len(self.q) / len(self.motion.t)
 
 
 def run(e: CartExperiment, method: str, iterations: int = PUBLISHED_ITERATIONS) -> CartRun:
@@ -136,12 +138,18 @@ def run(e: CartExperiment, method: str, iterations: int = PUBLISHED_ITERATIONS) 
     keep = (e.flange_xy, *_CART, e.radius)
     if method == "redundancy":
         q = redundancy(e)
-        motion = evaluate_cart_motion(e.flange_xy, q[:, 0], e.radius, duration=e.duration)
-        return _judge(e, method, motion, q)
+        looked_at = evaluate_cart_motion(e.flange_xy, q[:, 0], e.radius, duration=e.duration)
+        return _judge(e, method, looked_at, q)
+    motion: CartMotion | PlaneCartMotion
     if method == "linear":
         motion = evaluate_cart_motion(e.flange_xy, np.linspace(*_CART, e.samples), e.radius, duration=e.duration)
     elif method == "exact":
         motion = cart_motion(*keep, turn=e.turn, cart_range=e.cart_range, duration=e.duration)
+    elif method == "plane":
+        start, end = ((x, 0.0) for x in _CART)
+        motion = cart_motion_plane(
+            e.flange_xy, start, end, e.radius, turn=e.turn, x_range=e.cart_range, duration=e.duration
+        )
     elif method in ("gradient", "gradient-admissible"):
         motion = cart_motion(
             *keep,
@@ -157,12 +165,19 @@ def run(e: CartExperiment, method: str, iterations: int = PUBLISHED_ITERATIONS) 
     path, to_tip, to_base = e.path, np.linalg.inv(e.tool), np.linalg.inv(e.mount)
 
     def pose_at(s: float) -> Array:
-        cart = float(motion.sample(s * e.duration))
-        pose: Array = to_base @ _shift(-cart) @ path(np.array([s]))[0] @ to_tip
+        cart = np.atleast_1d(motion.sample(s * e.duration))
+        pose: Array = to_base @ _shift(*-cart) @ path(np.array([s]))[0] @ to_tip
         return pose
 
     joints, reached = follow(e.chain, pose_at, e.s, e.taught[0, 1:])
-    return _judge(e, method, motion, np.column_stack([motion.x[:reached], joints[:reached]]))
+    return _judge(e, method, motion, np.column_stack([cart_xy(motion)[:reached, 0], joints[:reached]]))
+
+
+def cart_xy(motion: CartMotion | PlaneCartMotion) -> Array:
+    """(M, 2) [m] of the cart; with one axis it is on the line y = 0."""
+    if isinstance(motion, PlaneCartMotion):
+        return motion.xy
+    return np.column_stack([motion.x, np.zeros_like(motion.x)])
 
 
 def redundancy(e: CartExperiment, gain: float = 1.0, damping: float = 0.02, feedback: float = 1.0) -> Array:
@@ -213,11 +228,11 @@ def density(x: Array, lower: float, upper: float) -> Array:
     return value
 
 
-def _judge(e: CartExperiment, method: str, motion: CartMotion, q: Array) -> CartRun:
+def _judge(e: CartExperiment, method: str, motion: CartMotion | PlaneCartMotion, q: Array) -> CartRun:
     poses = e.path(e.s[: len(q)])
     task = max(
-        float(np.max(np.abs(sk.pose_error(_shift(c[0]) @ e.mount @ e.chain.pose(c[1:]) @ e.tool, p))))
-        for c, p in zip(q, poses, strict=True)
+        float(np.max(np.abs(sk.pose_error(_shift(*c) @ e.mount @ e.chain.pose(joints) @ e.tool, p))))
+        for c, joints, p in zip(cart_xy(motion), q[:, 1:], poses, strict=False)
     )
     least = np.linalg.svd(e.chain.jacobian(q[:, 1:]), compute_uv=False)[:, -1]
     speed = np.abs(np.diff(q[:, 1:], axis=0)) * ((e.samples - 1) / e.duration)
@@ -227,9 +242,9 @@ def _judge(e: CartExperiment, method: str, motion: CartMotion, q: Array) -> Cart
     )
 
 
-def _shift(x: float) -> Array:
+def _shift(x: float, y: float = 0.0) -> Array:
     pose = np.eye(4)
-    pose[0, 3] = x
+    pose[:2, 3] = x, y
     return pose
 
 

@@ -11,6 +11,8 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
+from sigmaik.planning.cart import CartMotion
+
 from .cart import METHODS, CartExperiment, CartRun
 
 __all__ = ["cart_table", "save_cart_table"]
@@ -67,7 +69,7 @@ def save_cart_table(e: CartExperiment, runs: Sequence[CartRun], file: pathlib.Pa
         for run in runs:
             m = run.motion
             writer.writerow(
-                [e.variant, run.method, e.samples, m.iterations, m.inside, m.time_inside, m.clearance, m.energy, run.followed]
+                [e.variant, run.method, e.samples, m.iterations if isinstance(m, CartMotion) else m.programs, m.inside, m.time_inside, m.clearance, m.energy, run.followed]
                 + [run.task_error, run.min_singular_value, run.max_joint_speed, *run.joint_error]
             )
     return file

@@ -6,6 +6,7 @@
     trajectory.clearance.min_manipulability, trajectory.clearance.crossings
     motion = sk.planning.cart_motion(flange_xy, start, end, radius)   # of the cart under an arm
     motion.x, motion.energy, motion.clearance
+    motion = sk.planning.cart_motion_plane(flange_xy, (0, 0), (1, 0), radius)   # with two axes
     obstacles = sk.planning.Obstacles([sk.planning.Box(size=(0.8, 1.2, 0.04), pose=(0.6, 0.0, 0.4))])
     spheres = sk.planning.arm_spheres(chain, "arm.urdf")
     sk.planning.min_distance(spheres, obstacles, trajectory.q)
@@ -22,6 +23,7 @@ from sigmaik._core import (
 )
 
 from .cart import CartError, CartMotion, CartRegion, cart_motion, evaluate_cart_motion
+from .cart_plane import PlaneCartMotion, cart_motion_plane, evaluate_cart_motion_plane
 from .cart_trajectory import CartTrajectory, ShoulderCylinder, cart_trajectory, shoulder_cylinder
 from .clearance import Clearance, Crossing
 from .collision import arm_spheres, collision_cost, min_distance
@@ -43,14 +45,17 @@ __all__ = [
     "DistanceField",
     "JointCost",
     "Obstacles",
+    "PlaneCartMotion",
     "ShoulderCylinder",
     "Sphere",
     "Trajectory",
     "arm_spheres",
     "cart_motion",
+    "cart_motion_plane",
     "cart_trajectory",
     "collision_cost",
     "evaluate_cart_motion",
+    "evaluate_cart_motion_plane",
     "gradient",
     "joint_limit_cost",
     "min_distance",

@@ -220,10 +220,10 @@ def cart_motion(
     step = 1.0 / (5.0 * alpha) if step is None else step
     if not 0.0 < step < 1.0 / (4.0 * alpha):
         raise ValueError(f"step = {step} mm² must be between 0 and 1/(4 alpha) = {1.0 / (4.0 * alpha)} mm², to be stable")
-    path = _path(flange_xy)
+    path = planar_path(flange_xy)
     if not (math.isfinite(margin) and margin >= 0.0):
         raise ValueError(f"margin = {margin} m must be finite and not negative")
-    lower, upper = _core.forbidden_intervals(path, _positive("radius", radius) + margin)
+    lower, upper = _core.forbidden_intervals(path, positive("radius", radius) + margin)
     if isinstance(first_guess, str):
         if first_guess not in ("linear", "admissible"):
             raise ValueError(f"first_guess = {first_guess!r} must be 'linear', 'admissible' or of shape (M,)")
@@ -260,11 +260,11 @@ def _motion(
     regions: tuple[CartRegion, ...] = (),
     multipliers: Array | None = None,
 ) -> CartMotion:
-    path, law = _path(flange_xy), np.array(x, dtype=np.float64)
+    path, law = planar_path(flange_xy), np.array(x, dtype=np.float64)
     if law.shape != (len(path),) or not np.all(np.isfinite(law)):
         raise ValueError(f"x must be finite and of shape ({len(path)},), not {law.shape}")
-    _positive("duration", duration)
-    _positive("radius", radius)
+    positive("duration", duration)
+    positive("radius", radius)
     lower, upper = _core.forbidden_intervals(path, radius + margin)
     samples = np.arange(len(law), dtype=np.float64)
     at, at_x = (samples, law) if corners is None else (np.array(c, dtype=np.float64) for c in corners)
@@ -291,15 +291,15 @@ def _motion(
         duration=duration,
         energy=float(np.sum(np.diff(at_x) ** 2 / np.diff(at))),
         admissible=inside == 0,
-        clearance=_least_distance(seen),
+        clearance=least_distance(seen),
         inside=inside,
-        turn=_turn(seen),
+        turn=azimuth_turn(seen),
         method=method,
         iterations=iterations,
     )
 
 
-def _least_distance(seen: Array) -> float:
+def least_distance(seen: Array) -> float:
     """From the origin to a polygon line (K, 2)."""
     begin, step = seen[:-1], np.diff(seen, axis=0)
     length = np.sum(step**2, axis=1)
@@ -308,7 +308,7 @@ def _least_distance(seen: Array) -> float:
     return float(np.min(np.hypot(nearest[:, 0], nearest[:, 1])))
 
 
-def _turn(seen: Array) -> float:
+def azimuth_turn(seen: Array) -> float:
     """[rad] of the azimuth along a polygon line (K, 2), seen from the origin."""
     a, b = seen[:-1], seen[1:]
     return float(np.sum(np.arctan2(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], np.sum(a * b, axis=1))))
@@ -331,14 +331,14 @@ def _jump(law: _core.CartLaw, lower: Array, upper: Array, linear: Array, lowest:
     return filled
 
 
-def _path(flange_xy: ArrayLike) -> Array:
+def planar_path(flange_xy: ArrayLike) -> Array:
     path = np.array(flange_xy, dtype=np.float64)
     if path.ndim != 2 or path.shape[1] != 2 or len(path) < 2 or not np.all(np.isfinite(path)):
         raise Error(f"flange_xy must be finite and of shape (M, 2), M ≥ 2, not {path.shape}")
     return path
 
 
-def _positive(name: str, value: float) -> float:
+def positive(name: str, value: float) -> float:
     if not (math.isfinite(value) and value > 0.0):
         raise ValueError(f"{name} = {value} must be finite and greater than 0")
     return value
