@@ -153,25 +153,29 @@ void bind_methods(py::module_& m) {
         "J-PARSE (Guptasarma et al.): u_iᵀẋ/σ_i where σ_i > γσ_max, else σ_i/(γσ_max)² u_iᵀKẋ.\n\n"
         "Regular directions are exact; along a singular one motion fades out at the singularity and can leave it\n"
         "again. |q̇| ≤ |ẋ|/(γσ_max) for unit gains.");
-    c.def(py::init([](double gamma, double gain_linear, double gain_angular, bool continuous) {
-            return checked(JParse{gamma, gain_linear, gain_angular, continuous});
+    c.def(py::init([](double gamma, double gain_linear, double gain_angular, bool continuous, bool singular_posture) {
+            return checked(JParse{gamma, gain_linear, gain_angular, continuous, singular_posture});
           }),
           py::arg("gamma") = 0.1, py::arg("gain_linear") = 1.0, py::arg("gain_angular") = 1.0,
-          py::arg("continuous") = true,
+          py::arg("continuous") = true, py::arg("singular_posture") = false,
           "gamma: threshold in (0, 1] on σ_i/σ_max.\n"
           "gain_linear, gain_angular: the paper's K ≥ 0, for the command's linear and angular rows.\n"
           "continuous: the gain is K at σ_i = 0 and goes linearly to 1 at the threshold; False: K throughout, as\n"
-          "published, which jumps at the threshold where K ≠ 1.");
+          "published, which jumps at the threshold where K ≠ 1.\n"
+          "singular_posture: the posture acts along singular directions, as far as J-PARSE's own inverse does not, by its\n"
+          "I − J⁺J: an arm that was stretched out folds back to the side of its posture. False: it does not, as published.");
     c.def_readonly("gamma", &JParse::gamma);
     c.def_readonly("gain_linear", &JParse::gain_linear);
     c.def_readonly("gain_angular", &JParse::gain_angular);
     c.def_readonly("continuous", &JParse::continuous);
+    c.def_readonly("singular_posture", &JParse::singular_posture);
     finish(c, [](const JParse& r) {
       py::dict d;
       d["gamma"] = r.gamma;
       d["gain_linear"] = r.gain_linear;
       d["gain_angular"] = r.gain_angular;
       d["continuous"] = r.continuous;
+      d["singular_posture"] = r.singular_posture;
       return d;
     });
   }

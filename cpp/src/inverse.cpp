@@ -83,7 +83,7 @@ struct At {
     const double threshold = rule.gamma * scene.largest;
     if (sigma > threshold) return {1.0 / sigma, 1.0, true};
     const double share = sigma / threshold;
-    return {share / threshold, 1.0, false, rule.continuous ? 1.0 - share : 1.0};
+    return {share / threshold, rule.singular_posture ? share * share : 1.0, false, rule.continuous ? 1.0 - share : 1.0};
   }
   Direction operator()(const JacobianProjection& rule) const noexcept {
     return truncated(sigma, sigma > rule.gamma * scene.largest, 0.0);

@@ -374,12 +374,14 @@ class JParse:
         ...
     def __hash__(self) -> int:
         ...
-    def __init__(self, gamma: typing.SupportsFloat | typing.SupportsIndex = 0.1, gain_linear: typing.SupportsFloat | typing.SupportsIndex = 1.0, gain_angular: typing.SupportsFloat | typing.SupportsIndex = 1.0, continuous: bool = True) -> None:
+    def __init__(self, gamma: typing.SupportsFloat | typing.SupportsIndex = 0.1, gain_linear: typing.SupportsFloat | typing.SupportsIndex = 1.0, gain_angular: typing.SupportsFloat | typing.SupportsIndex = 1.0, continuous: bool = True, singular_posture: bool = False) -> None:
         """
         gamma: threshold in (0, 1] on σ_i/σ_max.
         gain_linear, gain_angular: the paper's K ≥ 0, for the command's linear and angular rows.
         continuous: the gain is K at σ_i = 0 and goes linearly to 1 at the threshold; False: K throughout, as
         published, which jumps at the threshold where K ≠ 1.
+        singular_posture: the posture acts along singular directions, as far as J-PARSE's own inverse does not, by its
+        I − J⁺J: an arm that was stretched out folds back to the side of its posture. False: it does not, as published.
         """
     def __reduce__(self) -> tuple[typing.Any, tuple[typing.Any, ...]]:
         ...
@@ -396,6 +398,9 @@ class JParse:
         ...
     @property
     def gamma(self) -> float:
+        ...
+    @property
+    def singular_posture(self) -> bool:
         ...
 class JacobianProjection:
     """

@@ -32,6 +32,7 @@ std::vector<Method> all_methods() {
                           JParse{},
                           JParse{0.3, 2.0, 0.5, true},
                           JParse{0.3, 2.0, 0.5, false},
+                          JParse{0.3, 2.0, 0.5, true, true},
                           JParse{1.0, 0.0, 3.0, true},
                           JacobianProjection{},
                           JacobianSafety{},
@@ -53,6 +54,7 @@ std::string label(const Method& m) {
   }
   if (const auto* j = std::get_if<JParse>(&m)) {
     text += " gamma " + std::to_string(j->gamma) + (j->continuous ? " continuous" : " published");
+    if (j->singular_posture) text += " posture";
   }
   return text;
 }
@@ -108,7 +110,7 @@ Expected expected(const Method& method, const Spectrum& s, int i, const VectorXd
       amplified += s.u(i)[row] * gain * x[row];
     }
     const double gain = sigma / (threshold * threshold);
-    return {gain * amplified, 1.0, gain};
+    return {gain * amplified, r->singular_posture ? sigma * gain : 1.0, gain};
   }
   if (const auto* r = std::get_if<JacobianProjection>(&method)) {
     return sigma > r->gamma * largest ? kept(sigma, 1.0) : Expected{0.0, 0.0, 0.0};

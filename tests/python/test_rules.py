@@ -125,7 +125,7 @@ def manipulability(damping, threshold, relative):
     return rule
 
 
-def jparse(m, gamma, linear, angular, continuous):
+def jparse(m, gamma, linear, angular, continuous, singular_posture=False):
     K = gains(m, linear, angular)
 
     def rule(s, all_):
@@ -133,7 +133,7 @@ def jparse(m, gamma, linear, angular, continuous):
         if s > threshold:
             return 1 / s, 1.0, 1.0
         share = s / threshold
-        return s / threshold**2, 1.0, (share + (1 - share) * K) if continuous else K
+        return s / threshold**2, share**2 if singular_posture else 1.0, (share + (1 - share) * K) if continuous else K
 
     return rule
 
@@ -179,6 +179,10 @@ TABLE = {
     "J-PARSE, published": (
         lambda m: sk.JParse(0.1, 2.0, 0.5, continuous=False),
         lambda m: jparse(m, 0.1, 2, 0.5, False),
+    ),
+    "J-PARSE, posture": (
+        lambda m: sk.JParse(singular_posture=True),
+        lambda m: jparse(m, 0.1, 1, 1, True, True),
     ),
     "projection": (lambda m: sk.JacobianProjection(), lambda m: projection(0.1, 0.0)),
     "safety": (lambda m: sk.JacobianSafety(), lambda m: safety(0.1)),

@@ -77,6 +77,9 @@ struct JParse {
   /// The gain is K at σ_i = 0 and goes linearly to I at σ_i = γσ_max. false: K throughout, as published;
   /// with K ≠ I the answer then jumps at the threshold.
   bool continuous = true;
+  /// Whether the posture acts along singular directions, as far as J-PARSE's own inverse does not: I − J⁺J, whose p_i is
+  /// (σ_i/(γσ_max))². An arm that was stretched out then folds back to the side of its posture. false: p_i = 1, as published.
+  bool singular_posture = false;
 };
 
 /// Ablation of J-PARSE: regular directions only, posture free in the others (eq. 62).

@@ -62,7 +62,12 @@ def _gamma(settings: Settings) -> dict[str, Value]:
 
 def _jparse(settings: Settings) -> dict[str, Value]:
     gain = settings.singular_gain
-    return {"gamma": settings.gamma, "gain_linear": gain, "gain_angular": gain}
+    return {
+        "gamma": settings.gamma,
+        "gain_linear": gain,
+        "gain_angular": gain,
+        "singular_posture": settings.singular_posture,
+    }
 
 
 # Buss and Kim let a joint turn by 45° an update, whatever the update's rate.
@@ -79,7 +84,7 @@ _FAMILIES: dict[str, _Family] = {
     "jparse": _Family(
         "J-PARSE",
         sk.JParse,
-        {"gamma": 0.1, "gain_linear": 1.0, "gain_angular": 1.0, "continuous": True},
+        {"gamma": 0.1, "gain_linear": 1.0, "gain_angular": 1.0, "continuous": True, "singular_posture": False},
         _jparse,
     ),
     "pinv": _Family("pseudo-inverse", sk.PseudoInverse, {"tolerance": 1e-12}, _none),

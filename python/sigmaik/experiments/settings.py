@@ -23,6 +23,7 @@ class Settings:
     max_orientation_error: float = math.pi  #: cap on e_o [rad]; π is none
     gamma: float = 0.1  #: γ, threshold on σ_i/σ_max of J-PARSE and its ablations
     singular_gain: float = 1.0  #: J-PARSE's gain in singular directions, position and orientation
+    singular_posture: bool = False  #: whether the posture acts along J-PARSE's singular directions
     start: tuple[float, ...] | None = None  #: (n,) [rad] where the arm starts; None: its home
     posture: tuple[float, ...] | None = None  #: q_nominal (n,) [rad]; None: where the arm starts
     posture_gain: float = 0.0  #: k_n [1/s]

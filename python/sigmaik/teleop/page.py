@@ -205,6 +205,13 @@ class Page:
                 slider = gui.add_slider(label, 0.0, most, 0.1, getattr(settings, name))
                 self._bind(slider, name, functools.partial(_number, least=0.0, most=most))
 
+            posture = gui.add_checkbox(
+                "posture at singularities",
+                settings.singular_posture,
+                hint="J-PARSE: an arm that was stretched out folds back to the side of its posture; off is as published",
+            )
+            self._bind(posture, "singular_posture", bool)
+
     def _build_limits(self) -> None:
         gui, settings = self._server.gui, self.session.settings
         with gui.add_folder("Limits and task"):

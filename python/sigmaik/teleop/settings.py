@@ -21,6 +21,7 @@ class Settings:
     method: str = "jparse"  #: as for `sigmaik reach`: "jparse", "dls:damping=0.05"
     gamma: float = 0.1  #: γ of J-PARSE and its ablations, threshold on σ_i/σ_max
     singular_gain: float = 1.0  #: J-PARSE's gain in singular directions
+    singular_posture: bool = True  #: whether the posture acts along J-PARSE's singular directions
     gain_linear: float = 5.0  #: [1/s] position error to velocity
     gain_angular: float = 5.0  #: [1/s] orientation error to angular velocity
     max_linear_error: float = 0.08  #: [m] longer position errors are shortened to it
@@ -55,7 +56,9 @@ class Settings:
 
     def rule(self, rate: float = 1000.0) -> methods.NamedMethod:
         """The method at a servo's rate [Hz]."""
-        settings = experiment.Settings(rate=rate, gamma=self.gamma, singular_gain=self.singular_gain)
+        settings = experiment.Settings(
+            rate=rate, gamma=self.gamma, singular_gain=self.singular_gain, singular_posture=self.singular_posture
+        )
         return methods.parse_method(self.method, settings)
 
     def servo(self, chain: sk.Chain, dt: float, posture: ArrayLike) -> sk.Servo:
