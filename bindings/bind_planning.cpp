@@ -3,6 +3,7 @@
 #include <sigmaik/planning/time_optimal.hpp>
 
 #include "arguments.hpp"
+#include "python_cost.hpp"
 
 namespace sigmaik::bindings {
 namespace {
@@ -126,10 +127,13 @@ void bind_planning(py::module_& m) {
   py::class_<SupportPlanner>(m, "SupportPlanner",
                              "Motions as support states under a Gaussian-process prior (Petrović et al.).\n"
                              "`sigmaik.planning.stochastic` and `gradient` are what to call.")
-      .def(py::init([](const Chain& chain, const std::shared_ptr<JointCost>& cost, int states) {
-             return SupportPlanner(chain, cost, states);
+      .def(py::init([](const Chain& chain, const std::optional<std::shared_ptr<JointCost>>& cost, int states,
+                       const std::vector<py::object>& python_costs) {
+             return SupportPlanner(chain, with_python_costs(cost.value_or(nullptr), chain.dof(), python_costs), states);
            }),
-           py::arg("chain"), py::arg("cost"), py::arg("states"))
+           py::arg("chain"), py::arg("cost"), py::arg("states"), py::arg("python_costs") = std::vector<py::object>{},
+           "`cost` and those of `python_costs` (value(q: (B, n)) -> (B,), gradient or not) are added up.\n\n"
+           "Raises Error where there is none, or one is not a cost of this chain's joints.")
       .def(
           "gradient",
           [](SupportPlanner& p, const ArrayLike& start, const ArrayLike& goal, double prior_weight, int max_iterations,

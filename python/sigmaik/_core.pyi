@@ -7,7 +7,7 @@ import enum
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['AdaptiveDampedLeastSquares', 'AnalyticBranch', 'AnalyticIk', 'ArmSpheres', 'CartError', 'CartLaw', 'CartRegion', 'Chain', 'ConstrainedIk', 'ConstrainedIkStep', 'DEFAULT_SCALE', 'DampedLeastSquares', 'DistanceField', 'Dynamics', 'Error', 'JParse', 'JacobianProjection', 'JacobianSafety', 'JacobianSafetyProjection', 'JointCost', 'JointLimits', 'LeastSquaresSolution', 'PlaneCartLaw', 'PseudoInverse', 'SelectivelyDampedLeastSquares', 'Servo', 'ServoStep', 'SingularSets', 'Solution', 'Spectrum', 'Status', 'SupportPlanner', 'SupportStates', 'TimeOptimal', 'TimeOptimalResult', 'VelocitySolver', 'cart_descent', 'cart_law', 'collision_cost', 'evaluate_index', 'forbidden_intervals', 'geometry_aware_cost', 'index_of_jacobian', 'joint_limit_cost', 'known_singular_sets', 'least_squares', 'load_singular_sets', 'log_manipulability_cost', 'manipulability_cost', 'min_distance', 'plane_cart_law', 'pose_error', 'potential_cost', 'reference_scale', 'rotation_exp', 'rotation_log', 'self_collision_cost', 'self_collision_pairs', 'singular_sets_of', 'solve_batch', 'spline_velocities', 'sum_of_costs', 'taut_string']
+__all__: list[str] = ['AdaptiveDampedLeastSquares', 'AnalyticBranch', 'AnalyticIk', 'ArmSpheres', 'CartError', 'CartLaw', 'CartRegion', 'Chain', 'ComputedTorque', 'ComputedTorqueStep', 'ConstrainedIk', 'ConstrainedIkStep', 'DEFAULT_SCALE', 'DampedLeastSquares', 'DistanceField', 'Dynamics', 'Error', 'Inertia', 'JParse', 'JacobianProjection', 'JacobianSafety', 'JacobianSafetyProjection', 'JointCost', 'JointLimits', 'LeastSquaresSolution', 'LoopCommand', 'LoopStatistics', 'PlaneCartLaw', 'PseudoInverse', 'SampleCounts', 'SampleStatus', 'Segment', 'SelectivelyDampedLeastSquares', 'Servo', 'ServoLoop', 'ServoStep', 'SingularSets', 'Solution', 'Spectrum', 'Status', 'StreamStatus', 'SupportPlanner', 'SupportStates', 'Target', 'TargetStream', 'TimeOptimal', 'TimeOptimalResult', 'VelocitySolver', 'cart_descent', 'cart_law', 'collision_cost', 'evaluate_index', 'forbidden_intervals', 'geometry_aware_cost', 'index_of_jacobian', 'joint_limit_cost', 'known_singular_sets', 'least_squares', 'load_singular_sets', 'log_manipulability_cost', 'manipulability_cost', 'min_distance', 'plane_cart_law', 'pose_error', 'potential_cost', 'reference_scale', 'rotation_exp', 'rotation_log', 'self_collision_cost', 'self_collision_pairs', 'singular_sets_of', 'solve_batch', 'spline_velocities', 'sum_of_costs', 'taut_string']
 class Error(ValueError):
     """
     What set-up and checked calls refuse. The text carries the facts.
@@ -54,6 +54,71 @@ class JointLimits:
     def velocity(self) -> numpy.typing.NDArray[numpy.float64]:
         """
         (n,) [rad/s or m/s]
+        """
+class Inertia:
+    """
+    Mass distribution of a link, or of what the tip carries. Immutable.
+    """
+    def __init__(self, mass: typing.SupportsFloat | typing.SupportsIndex, center_of_mass: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), tensor: numpy.typing.ArrayLike | None = None) -> None:
+        """
+        mass: [kg].
+        center_of_mass: (3,) [m], in the link's frame.
+        tensor: (3, 3) [kg·m²], about the centre of mass, in the link's axes; None: a point mass.
+
+        Chains and Dynamics check the values.
+        """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def center_of_mass(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3,) [m], in the link's frame
+        """
+    @property
+    def mass(self) -> float:
+        """
+        [kg]
+        """
+    @property
+    def tensor(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3, 3) [kg·m²], about the centre of mass, in the link's axes
+        """
+class Segment:
+    """
+    A joint, fixed or movable, and the link that it carries. The link's frame is the joint's after the motion: parent ← origin · motion(axis, q).
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def axis(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3,) unit vector in the joint's frame
+        """
+    @property
+    def inertia(self) -> Inertia | None:
+        """
+        Of the link, None where it is not known.
+        """
+    @property
+    def joint_name(self) -> str:
+        """
+        Name of the joint.
+        """
+    @property
+    def link_name(self) -> str:
+        """
+        Name of the link.
+        """
+    @property
+    def origin(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (4, 4) the joint's frame in the parent link, at q = 0
+        """
+    @property
+    def type(self) -> str:
+        """
+        'fixed', 'revolute', 'continuous' or 'prismatic'.
         """
 class Chain:
     """
@@ -122,6 +187,11 @@ class Chain:
     def limits(self) -> JointLimits:
         """
         Limits of the movable joints.
+        """
+    @property
+    def segments(self) -> tuple[Segment, ...]:
+        """
+        Everything between base and tip, fixed joints included.
         """
     @property
     def tip(self) -> str:
@@ -501,6 +571,11 @@ class ServoStep:
         (6,) J q̇ [m/s, rad/s]
         """
     @property
+    def asked_twist(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (6,) what the rule was given: the twist command, or the pose error's [m/s, rad/s]
+        """
+    @property
     def limiting_joints(self) -> tuple[int, ...]:
         """
         Indices of the joints held at a limit that the rule's answer would break.
@@ -567,16 +642,28 @@ class Servo:
         exact: (6,) truth values: rows (vx, vy, vz, ωx, ωy, ωz) that come before the others when redistributing.
         length_scale, mask, frame: as for VelocitySolver.
         """
+    def continue_from(self, other: Servo) -> None:
+        """
+        Takes over from another servo of the same arm and dt, in the midst of its motion.
+
+        Rule and options are this one's; what it commands is faded in from the other's last velocity over soft_start.
+        """
+    def hold(self) -> ServoStep:
+        """
+        One cycle of the fastest stop that the limits allow, or of rest: HOLDING.
+        """
     def reset(self, q: numpy.typing.ArrayLike, qdot: numpy.typing.ArrayLike | None = None) -> None:
         """
         Starts, or starts again, at q (n,): forgets all history, and pins the posture there unless one was given.
 
         qdot: (n,) how the arm moves now, from which the command is faded; None: it stands.
         """
-    def update(self, target: typing.Any) -> ServoStep:
+    def update(self, target: typing.Any, feedforward: numpy.typing.ArrayLike | None = None) -> ServoStep:
         """
         One cycle towards a pose (4, 4) of the tip in the base.
 
+        feedforward: (6,) twist [v; ω] of a target that moves, base axes, at its origin, added to gain × error. Behind
+            a target of constant twist the tip lags by speed/gain without it, and not at all with it.
         Raises Error, and holds, where the target is not a pose.
         """
     def update_twist(self, twist: numpy.typing.ArrayLike) -> ServoStep:
@@ -609,27 +696,308 @@ class Servo:
         """
         (n,) where the reference stands.
         """
+class LoopCommand(enum.IntEnum):
+    """
+    What a cycle of a ServoLoop followed.
+    """
+    HOLD = ...
+    POSE = ...
+    STALE = ...
+    TWIST = ...
+class LoopStatistics:
+    """
+    How a ServoLoop keeps its rate.
+    """
+    @property
+    def cycles(self) -> int:
+        ...
+    @property
+    def elapsed(self) -> float:
+        """
+        [s] since start(), or from start() to stop().
+        """
+    @property
+    def missed(self) -> int:
+        """
+        Cycles left out, as their time had passed.
+        """
+    @property
+    def rate(self) -> float:
+        """
+        [Hz] cycles a second.
+        """
+    @property
+    def unread(self) -> int:
+        """
+        Samples lost, as nobody read them in time.
+        """
+    @property
+    def worst_delay(self) -> float:
+        """
+        [s] from when a cycle was due to its start.
+        """
+class ServoLoop:
+    """
+    A servo in a thread of its own, at its own rate, whatever Python does meanwhile.
+
+    Commands hold until they are stale: an arm whose commander hangs, or is gone, stops by itself, within its
+    limits. Late cycles are counted and left out, never made up for by a burst.
+    """
+    def __enter__(self) -> typing.Any:
+        ...
+    def __exit__(self, type: typing.Any, value: typing.Any, traceback: typing.Any) -> None:
+        ...
+    def __init__(self, servo: Servo, *, history: typing.SupportsInt | typing.SupportsIndex = 4096, priority: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+        """
+        servo: has started (reset); it is copied.
+        history: samples kept for read(), a power of 2.
+        priority: of SCHED_FIFO, 1 to 99; 0 is the ordinary scheduler.
+        """
+    def configure(self, servo: Servo, restart: bool = False) -> int:
+        """
+        Goes on with another servo (a copy) of the same arm and dt: other rule, other options.
+
+        It takes over the motion, or with `restart` starts where it was reset to: for arms that do not exist.
+        Returns a number, one more each time, by which samples tell it; 0 is the first servo's.
+        """
+    def follow(self, target: typing.Any, timeout: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        """
+        Follows a pose (4, 4) of the tip in the base, for `timeout` [s] unless it is said again.
+        """
+    def follow_twist(self, twist: numpy.typing.ArrayLike, timeout: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        """
+        Follows a twist (6,) [v; ω], base axes, at the tip's origin, for `timeout` [s] unless it is said again.
+        """
+    def hold(self) -> None:
+        """
+        Stops as fast as limits allow, and rests.
+        """
+    def read(self) -> numpy.ndarray:
+        """
+        (N,) structured array: what was done in each cycle since the last call.
+
+        cycle, time [s] since start(), command (LoopCommand), configuration, restarted, status (Status), q and qdot (n,), target and
+        pose (4, 4) of the tip, pose_error, asked_twist and achieved_twist (6,), singular_values (NaN while holding),
+        singular and limiting_joints (bits), scale.
+        """
+    def start(self) -> None:
+        """
+        Starts the thread. Raises Error where it runs already, or the system refuses the priority.
+        """
+    def stop(self) -> None:
+        """
+        Brings the arm to rest, in a second at most, and ends the thread.
+        """
+    @property
+    def dt(self) -> float:
+        """
+        [s]
+        """
+    @property
+    def running(self) -> bool:
+        ...
+    @property
+    def statistics(self) -> LoopStatistics:
+        ...
+class StreamStatus(enum.IntEnum):
+    """
+    What a target is, ordered from the best to the worst.
+    """
+    COASTING = ...
+    STALE = ...
+    TRACKING = ...
+    WAITING = ...
+class SampleStatus(enum.IntEnum):
+    """
+    What became of a sample.
+    """
+    ACCEPTED = ...
+    INVALID = ...
+    OUTLIER = ...
+    OUT_OF_ORDER = ...
+    RELOCATED = ...
+class SampleCounts:
+    """
+    How many samples had which fate.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def accepted(self) -> int:
+        """
+        Relocated ones included.
+        """
+    @property
+    def invalid(self) -> int:
+        ...
+    @property
+    def out_of_order(self) -> int:
+        ...
+    @property
+    def outliers(self) -> int:
+        ...
+    @property
+    def relocated(self) -> int:
+        ...
+class Target:
+    """
+    Where to be now, and how to move: servo.update(target.pose, target.twist).
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def age(self) -> float:
+        """
+        [s] since the newest sample was taken; 0 before the first.
+        """
+    @property
+    def pose(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (4, 4) in base.
+        """
+    @property
+    def status(self) -> StreamStatus:
+        """
+        See StreamStatus.
+        """
+    @property
+    def twist(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (6,) derivative of the pose: [v; ω], base axes, at its origin.
+        """
+class TargetStream:
+    """
+    The way from a sensor to a servo: stamped samples of a pose in, one smooth target a cycle out.
+
+        stream.push(stamp, pose)                     # whenever there is one: stamp = when it was taken
+        target = stream.at(now)                      # each cycle, on the same clock
+        servo.update(target.pose, target.twist)
+
+    Samples may come late, doubled, wrong or not at all. Targets are continuous, with their twist, and never faster
+    than max_speed and max_angular_speed: not when a sample arrives, not when the stream stops or starts again, not
+    when the target is found elsewhere.
+    """
+    def __init__(self, mode: str = 'predict', *, max_speed: typing.SupportsFloat | typing.SupportsIndex = 1.5, max_angular_speed: typing.SupportsFloat | typing.SupportsIndex = 4.0, smoothing: typing.SupportsFloat | typing.SupportsIndex = 0.05, latency: typing.SupportsFloat | typing.SupportsIndex = 0.1, horizon: typing.SupportsFloat | typing.SupportsIndex = 0.1, timeout: typing.SupportsFloat | typing.SupportsIndex = 0.3, noise_linear: typing.SupportsFloat | typing.SupportsIndex = 0.002, noise_angular: typing.SupportsFloat | typing.SupportsIndex = 0.01, acceleration_linear: typing.SupportsFloat | typing.SupportsIndex = 3.0, acceleration_angular: typing.SupportsFloat | typing.SupportsIndex = 10.0, relocate: typing.SupportsInt | typing.SupportsIndex = 5) -> None:
+        """
+        mode: where the target is between samples, and after the last one. 'hold': at the last sample, for devices that
+            send only changes; 'interpolate': on a smooth curve through the samples, `latency` ago; 'predict': where a
+            constant-velocity Kalman filter expects it now.
+        max_speed [m/s], max_angular_speed [rad/s]: nothing is faster; a sample that would have to be is an outlier.
+        smoothing: [s] time constant of the way from where the target is to where a new sample says it is; at 0 the
+            twist jumps.
+        latency: [s] 'interpolate' plays so late: the sensor's delay, and one or two samples.
+        horizon, timeout: [s] so long after its last sample the target moves on as it did, and by then it has come to
+            rest, and the stream is stale.
+        noise_linear [m], noise_angular [rad]: standard deviation of a sample, each axis.
+        acceleration_linear [m/s²], acceleration_angular [rad/s²]: of what the target may do between samples.
+        relocate: so many refused samples in a row that agree with each other are believed.
+        """
+    def at(self, time: typing.SupportsFloat | typing.SupportsIndex) -> Target:
+        """
+        The target at a time [s] not before that of the last call; else the last one again.
+        """
+    def push(self, time: typing.SupportsFloat | typing.SupportsIndex, pose: typing.Any) -> SampleStatus:
+        """
+        A sample: when it was taken [s], and the pose (4, 4) then. Raises Error where it is not a pose.
+        """
+    def reset(self, start: typing.Any = None) -> None:
+        """
+        Forgets everything. The next target is at `start` (4, 4), such as the tip's pose, and goes to the samples from
+        there; with None it is where the first sample is.
+        """
+    @property
+    def counts(self) -> SampleCounts:
+        """
+        How many samples had which fate.
+        """
 class Dynamics:
     """
-    Rigid-body dynamics M(q) q̈ + C(q, q̇) q̇ + g(q) = τ of a chain, by KDL's ChainDynParam.
+    Rigid-body dynamics M(q) q̈ + C(q, q̇) q̇ + g(q) = τ of a chain with what it carries, by KDL.
     """
-    def __init__(self, chain: Chain, gravity: numpy.typing.ArrayLike | None = None) -> None:
+    def __init__(self, chain: Chain, gravity: numpy.typing.ArrayLike | None = None, payload: Inertia | None = None) -> None:
         """
         gravity: (3,) [m/s²] in base axes; by default 9.80665 m/s² along −z.
+        payload: what the tip carries, in the tip's frame.
 
-        Raises Error where a movable joint carries no link whose inertia is known.
+        Raises Error where a movable joint carries no link whose inertia is known, and where the payload is no body:
+        a mass below 0, a tensor that is not symmetric, a principal moment beyond the sum of the other two.
         """
     def coriolis(self, q: numpy.typing.ArrayLike, qdot: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
         """
         C(q, q̇) q̇ (n,) [N·m] at q and q̇ (n,).
         """
+    def forward_dynamics(self, q: numpy.typing.ArrayLike, qdot: numpy.typing.ArrayLike, torque: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        q̈ = M⁻¹ (τ − C q̇ − g) (n,) [rad/s² or m/s²] at q, q̇ (n,) under τ (n,) [N·m].
+
+        Raises Error where M is not positive definite.
+        """
     def gravity(self, q: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
         """
         g (n,) [N·m] at q (n,): the torques that hold the arm.
         """
+    def inverse_dynamics(self, q: numpy.typing.ArrayLike, qdot: numpy.typing.ArrayLike, qddot: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        τ = M q̈ + C q̇ + g (n,) [N·m] at q, q̇, q̈ (n,), by one recursion of Newton and Euler.
+        """
     def mass_matrix(self, q: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
         """
         M (n, n) [kg·m²] at q (n,).
+        """
+    @property
+    def dof(self) -> int:
+        """
+        Number of movable joints, n.
+        """
+class ComputedTorqueStep:
+    """
+    Answer of one cycle of a ComputedTorque.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def limiting_joints(self) -> tuple[int, ...]:
+        """
+        Indices of the joints whose torque would break its limit.
+        """
+    @property
+    def scale(self) -> float:
+        """
+        In [0, 1], the part of v that effort limits leave.
+        """
+    @property
+    def status(self) -> Status:
+        """
+        OK, or LIMITED where an effort limit would be broken.
+        """
+    @property
+    def torque(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (n,) [N·m or N], within the chain's effort limits
+        """
+class ComputedTorque:
+    """
+    Computed torque control: τ = M(q) v + C(q, q̇) q̇ + g(q), v = q̈_d + 2ζω ė + ω² e, e = q_d − q.
+
+    With the true model every joint's error obeys ë + 2ζω ė + ω² e = 0 by itself (Beck et al. 2022,
+    eqs. 18 to 20). Where an effort limit of the chain would be broken, v is scaled down in all joints alike.
+    """
+    def __init__(self, chain: Chain, *, frequency: typing.SupportsFloat | typing.SupportsIndex = 20.0, damping_ratio: typing.SupportsFloat | typing.SupportsIndex = 1.0, gravity: numpy.typing.ArrayLike | None = None, payload: Inertia | None = None) -> None:
+        """
+        frequency: ω [rad/s] > 0; the loop's rate should be 10 ω and more.
+        damping_ratio: ζ > 0; 1 is critical.
+        gravity, payload: what the controller knows of them, as for Dynamics.
+
+        Raises Error where an option is out of its range, and where Dynamics does.
+        """
+    def update(self, q: numpy.typing.ArrayLike, qdot: numpy.typing.ArrayLike, q_desired: numpy.typing.ArrayLike, qdot_desired: numpy.typing.ArrayLike, qddot_desired: numpy.typing.ArrayLike) -> ComputedTorqueStep:
+        """
+        One cycle: the arm is at q, q̇ (n,), and should be at q_d, q̇_d, accelerating by q̈_d.
+        """
+    @property
+    def dof(self) -> int:
+        """
+        Number of movable joints, n.
         """
 class LeastSquaresSolution:
     """
@@ -937,8 +1305,12 @@ class SupportPlanner:
     Motions as support states under a Gaussian-process prior (Petrović et al.).
     `sigmaik.planning.stochastic` and `gradient` are what to call.
     """
-    def __init__(self, chain: Chain, cost: JointCost, states: typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
+    def __init__(self, chain: Chain, cost: JointCost | None, states: typing.SupportsInt | typing.SupportsIndex, python_costs: collections.abc.Sequence[typing.Any] = []) -> None:
+        """
+        `cost` and those of `python_costs` (value(q: (B, n)) -> (B,), gradient or not) are added up.
+
+        Raises Error where there is none, or one is not a cost of this chain's joints.
+        """
     def gradient(self, start: numpy.typing.ArrayLike, goal: numpy.typing.ArrayLike, *, prior_weight: typing.SupportsFloat | typing.SupportsIndex, max_iterations: typing.SupportsInt | typing.SupportsIndex, tolerance: typing.SupportsFloat | typing.SupportsIndex, guess: SupportStates | None = None) -> SupportStates:
         ...
     def stochastic(self, start: numpy.typing.ArrayLike, goal: numpy.typing.ArrayLike, *, samples: typing.SupportsInt | typing.SupportsIndex, max_iterations: typing.SupportsInt | typing.SupportsIndex, deviation: typing.SupportsFloat | typing.SupportsIndex, decay: typing.SupportsFloat | typing.SupportsIndex, temperature: typing.SupportsFloat | typing.SupportsIndex, prior_weight: typing.SupportsFloat | typing.SupportsIndex, tolerance: typing.SupportsFloat | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> SupportStates:

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <deque>
 #include <limits>
+#include <numeric>
 #include <random>
 #include <utility>
 
@@ -39,15 +40,17 @@ Matrix covariance(int states) {
 
 struct SupportPlanner::Work {
   Chain chain;
-  JointCostPtr cost;
+  BatchCostPtr cost;
   int states, n, m;
   Matrix factor;     // C, lower
   Matrix smoothing;  // K̄ with each column's largest entry 1/N (16)
   Matrix line;       // μ
   JointVector lower, upper;
-  JointVector scratch, gradient;
+  // What the cost is asked, and says, in C order.
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> rows, gradients;
+  Eigen::VectorXd values;
 
-  Work(Chain c, JointCostPtr l, int count)
+  Work(Chain c, BatchCostPtr l, int count)
       : chain(std::move(c)), cost(std::move(l)), states(count), n(chain.dof()), m(count - 2) {
     require(states >= 3 && states <= 1000, "states = ", states, " must be in [3, 1000]");
     require(cost != nullptr, "there is no cost");
@@ -57,8 +60,9 @@ struct SupportPlanner::Work {
     smoothing = k * (k.colwise().maxCoeff() * (states - 1.0)).cwiseInverse().asDiagonal();
     lower = chain.limits().lower;
     upper = chain.limits().upper;
-    scratch.resize(n);
-    gradient.resize(n);
+    rows.resize(m, n);
+    gradients.resize(m, n);
+    values.resize(m);
   }
 
   void begin(const JointVector& start, const JointVector& goal) {
@@ -81,22 +85,16 @@ struct SupportPlanner::Work {
   }
 
   double value(const Matrix& q) {
-    double sum = 0.0;
-    for (int i = 0; i < m; ++i) {
-      scratch = q.row(i).transpose();
-      sum += cost->value(scratch);
-    }
-    return sum;
+    rows = q;
+    cost->evaluate(static_cast<std::size_t>(m), rows.data(), values.data(), nullptr);
+    return std::accumulate(values.begin(), values.end(), 0.0);
   }
 
   double slopes(const Matrix& q, Matrix& out) {
-    double sum = 0.0;
-    for (int i = 0; i < m; ++i) {
-      scratch = q.row(i).transpose();
-      sum += cost->gradient(scratch, gradient);
-      out.row(i) = gradient.transpose();
-    }
-    return sum;
+    rows = q;
+    cost->evaluate(static_cast<std::size_t>(m), rows.data(), values.data(), gradients.data());
+    out = gradients;
+    return std::accumulate(values.begin(), values.end(), 0.0);
   }
 
   Matrix whiten(const Matrix& q) const { return factor.triangularView<Eigen::Lower>().solve(q - line); }
@@ -117,7 +115,7 @@ struct SupportPlanner::Work {
   }
 };
 
-SupportPlanner::SupportPlanner(Chain chain, JointCostPtr cost, int states)
+SupportPlanner::SupportPlanner(Chain chain, BatchCostPtr cost, int states)
     : work_(std::make_unique<Work>(std::move(chain), std::move(cost), states)) {}
 SupportPlanner::~SupportPlanner() = default;
 SupportPlanner::SupportPlanner(SupportPlanner&&) noexcept = default;

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from sigmaik import _core, indices, singularities
 from sigmaik._core import ArmSpheres, Chain, DistanceField, JointCost
 
+from .batch_cost import BatchCost
 from .clearance import clearance
 from .collision import arm_spheres, collision_cost, min_distance
 from .obstacles import Obstacles
@@ -38,7 +39,7 @@ def gradient(
     index: Index | None = "geometry_aware",
     weight: float = 1.0,
     k: float | None = None,
-    costs: tuple[JointCost, ...] = (),
+    costs: tuple[JointCost | BatchCost, ...] = (),
     spheres: ArmSpheres | None = None,
     margin: float = 0.05,
     obstacle_weight: float = 1e4,
@@ -76,7 +77,7 @@ def gradient(
     k
         by default `indices.reference_scale(chain)`.
     costs
-        Further costs of the states, added up.
+        Further costs of the states, added up: any `JointCost`, or one written in Python (`BatchCost`).
     duration
         [s]; by default the shortest that keeps the limits of velocity and acceleration, 1 s where there are none.
 
@@ -89,7 +90,8 @@ def gradient(
     Raises
     ------
     ValueError
-        where an end or an option is out of its range.
+        where an end or an option is out of its range, or a cost's answer has another shape or is not finite. What a cost
+        written in Python raises comes through as it is.
     """
     scene = _Scene.of(chain, obstacles, spheres, margin, obstacle_weight, self_collision, start, goal)
     planner = _planner(chain, index, weight, k, states, (*costs, *scene.costs))
@@ -111,7 +113,7 @@ def stochastic(
     index: Index | None = "geometry_aware",
     weight: float = 1.0,
     k: float | None = None,
-    costs: tuple[JointCost, ...] = (),
+    costs: tuple[JointCost | BatchCost, ...] = (),
     spheres: ArmSpheres | None = None,
     margin: float = 0.05,
     obstacle_weight: float = 1e4,
@@ -198,14 +200,16 @@ def _planner(
     weight: float,
     k: float | None,
     states: int,
-    further: tuple[JointCost, ...],
+    further: tuple[JointCost | BatchCost, ...],
 ) -> _core.SupportPlanner:
     if index is not None and not further:
         return _planners.get(chain, index, weight, k, states)
     own = [] if index is None else [_index_cost(chain, index, weight, k)]
     if not own and not further:
         raise ValueError("there is no cost: index is None, and neither obstacles nor other costs are given")
-    return _core.SupportPlanner(chain, _core.sum_of_costs([*own, *further]), states)
+    python = [cost for cost in further if not isinstance(cost, JointCost)]
+    own += [cost for cost in further if isinstance(cost, JointCost)]
+    return _core.SupportPlanner(chain, _core.sum_of_costs(own) if own else None, states, python)
 
 
 @dataclass(frozen=True)
