@@ -158,7 +158,17 @@ void bind_planning(py::module_& m) {
           },
           py::arg("start"), py::arg("goal"), py::kw_only(), py::arg("samples"), py::arg("max_iterations"),
           py::arg("deviation"), py::arg("decay"), py::arg("temperature"), py::arg("prior_weight"), py::arg("tolerance"),
-          py::arg("seed"));
+          py::arg("seed"))
+      .def(
+          "draw",
+          [](SupportPlanner& p, const ArrayLike& start, const ArrayLike& goal, double deviation, std::uint64_t seed) {
+            const int n = p.chain().dof();
+            const JointVector from = joint_argument(start, "start", n), to = joint_argument(goal, "goal", n);
+            py::gil_scoped_release release;
+            return p.draw(from, to, deviation, seed);
+          },
+          py::arg("start"), py::arg("goal"), py::kw_only(), py::arg("deviation"), py::arg("seed"),
+          "A motion from the prior about the straight line: a first guess.");
 
   py::class_<TimeOptimalResult>(m, "TimeOptimalResult", "Answer of TimeOptimal.solve().")
       .def_property_readonly("status", [](const TimeOptimalResult& r) { return std::string(to_string(r.status)); },

@@ -66,6 +66,11 @@ class SupportPlanner {
   /// \throws Error as gradient()
   SupportStates stochastic(const JointVector& start, const JointVector& goal, const StochasticOptions& options);
 
+  /// A motion drawn from the prior about the straight line, of standard deviation `deviation` [rad or m] ≥ 0 half-way, its
+  /// states projected on the limits: a first guess. The same for the same seed.
+  /// \throws Error as gradient()
+  SupportStates draw(const JointVector& start, const JointVector& goal, double deviation, std::uint64_t seed);
+
   int states() const noexcept;
   const Chain& chain() const noexcept;
 
