@@ -3,6 +3,7 @@
 #include <sigmaik/planning/time_optimal.hpp>
 
 #include "arguments.hpp"
+#include "python_cost.hpp"
 
 namespace sigmaik::bindings {
 namespace {
@@ -126,10 +127,13 @@ void bind_planning(py::module_& m) {
   py::class_<SupportPlanner>(m, "SupportPlanner",
                              "Motions as support states under a Gaussian-process prior (Petrović et al.).\n"
                              "`sigmaik.planning.stochastic` and `gradient` are what to call.")
-      .def(py::init([](const Chain& chain, const std::shared_ptr<JointCost>& cost, int states) {
-             return SupportPlanner(chain, cost, states);
+      .def(py::init([](const Chain& chain, const std::optional<std::shared_ptr<JointCost>>& cost, int states,
+                       const std::vector<py::object>& python_costs) {
+             return SupportPlanner(chain, with_python_costs(cost.value_or(nullptr), chain.dof(), python_costs), states);
            }),
-           py::arg("chain"), py::arg("cost"), py::arg("states"))
+           py::arg("chain"), py::arg("cost"), py::arg("states"), py::arg("python_costs") = std::vector<py::object>{},
+           "`cost` and those of `python_costs` (value(q: (B, n)) -> (B,), gradient or not) are added up.\n\n"
+           "Raises Error where there is none, or one is not a cost of this chain's joints.")
       .def(
           "gradient",
           [](SupportPlanner& p, const ArrayLike& start, const ArrayLike& goal, double prior_weight, int max_iterations,
@@ -154,7 +158,17 @@ void bind_planning(py::module_& m) {
           },
           py::arg("start"), py::arg("goal"), py::kw_only(), py::arg("samples"), py::arg("max_iterations"),
           py::arg("deviation"), py::arg("decay"), py::arg("temperature"), py::arg("prior_weight"), py::arg("tolerance"),
-          py::arg("seed"));
+          py::arg("seed"))
+      .def(
+          "draw",
+          [](SupportPlanner& p, const ArrayLike& start, const ArrayLike& goal, double deviation, std::uint64_t seed) {
+            const int n = p.chain().dof();
+            const JointVector from = joint_argument(start, "start", n), to = joint_argument(goal, "goal", n);
+            py::gil_scoped_release release;
+            return p.draw(from, to, deviation, seed);
+          },
+          py::arg("start"), py::arg("goal"), py::kw_only(), py::arg("deviation"), py::arg("seed"),
+          "A motion from the prior about the straight line: a first guess.");
 
   py::class_<TimeOptimalResult>(m, "TimeOptimalResult", "Answer of TimeOptimal.solve().")
       .def_property_readonly("status", [](const TimeOptimalResult& r) { return std::string(to_string(r.status)); },

@@ -1310,8 +1310,16 @@ class SupportPlanner:
     Motions as support states under a Gaussian-process prior (Petrović et al.).
     `sigmaik.planning.stochastic` and `gradient` are what to call.
     """
-    def __init__(self, chain: Chain, cost: JointCost, states: typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
+    def __init__(self, chain: Chain, cost: JointCost | None, states: typing.SupportsInt | typing.SupportsIndex, python_costs: collections.abc.Sequence[typing.Any] = []) -> None:
+        """
+        `cost` and those of `python_costs` (value(q: (B, n)) -> (B,), gradient or not) are added up.
+
+        Raises Error where there is none, or one is not a cost of this chain's joints.
+        """
+    def draw(self, start: numpy.typing.ArrayLike, goal: numpy.typing.ArrayLike, *, deviation: typing.SupportsFloat | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> SupportStates:
+        """
+        A motion from the prior about the straight line: a first guess.
+        """
     def gradient(self, start: numpy.typing.ArrayLike, goal: numpy.typing.ArrayLike, *, prior_weight: typing.SupportsFloat | typing.SupportsIndex, max_iterations: typing.SupportsInt | typing.SupportsIndex, tolerance: typing.SupportsFloat | typing.SupportsIndex, guess: SupportStates | None = None) -> SupportStates:
         ...
     def stochastic(self, start: numpy.typing.ArrayLike, goal: numpy.typing.ArrayLike, *, samples: typing.SupportsInt | typing.SupportsIndex, max_iterations: typing.SupportsInt | typing.SupportsIndex, deviation: typing.SupportsFloat | typing.SupportsIndex, decay: typing.SupportsFloat | typing.SupportsIndex, temperature: typing.SupportsFloat | typing.SupportsIndex, prior_weight: typing.SupportsFloat | typing.SupportsIndex, tolerance: typing.SupportsFloat | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> SupportStates:

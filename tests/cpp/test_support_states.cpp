@@ -1,5 +1,7 @@
 #include <doctest/doctest.h>
 
+#include <stdexcept>
+
 #include <sigmaik/error.hpp>
 #include <sigmaik/planning/costs.hpp>
 #include <sigmaik/planning/support_states.hpp>
@@ -35,6 +37,21 @@ class Bowl final : public JointCost {
 
  private:
   JointVector center_;
+};
+
+// A bowl about zero that throws at its last call.
+class Throws final : public BatchCost {
+ public:
+  explicit Throws(int calls) : left_(calls) {}
+  int dof() const noexcept override { return 6; }
+  void evaluate(std::size_t count, const double* q, double* value, double* gradient) const override {
+    if (--left_ == 0) throw std::range_error("the last call");
+    bowl_.evaluate(count, q, value, gradient);
+  }
+
+ private:
+  mutable int left_;
+  Bowl bowl_{JointVector::Zero(6)};
 };
 
 }  // namespace
@@ -109,6 +126,21 @@ TEST_CASE("states stay within the limits") {
         CHECK(s.q[at] <= chain.limits().upper[joint]);
       }
     }
+  }
+}
+
+TEST_CASE("what a cost throws comes through, and the planner goes on") {
+  const Chain& chain = test::arms().at("ur10");
+  Random random(4);
+  const JointVector start = inside(random, chain), goal = inside(random, chain);
+  SupportPlanner other(chain, std::make_shared<Bowl>(JointVector::Zero(6)), 21);
+  for (const int calls : {1, 2, 4}) {
+    SupportPlanner planner(chain, std::make_shared<Throws>(calls), 21);
+    CHECK_THROWS_AS(planner.gradient(start, goal, {}), std::range_error);
+    CHECK(planner.gradient(start, goal, {}).q == other.gradient(start, goal, {}).q);
+    SupportPlanner samples(chain, std::make_shared<Throws>(calls), 21);
+    CHECK_THROWS_AS(samples.stochastic(start, goal, {}), std::range_error);
+    CHECK(samples.stochastic(start, goal, {}).q == other.stochastic(start, goal, {}).q);
   }
 }
 

@@ -249,6 +249,48 @@ def test_what_touches_is_refused_or_fails(table):
         pytest.fail("no task leads through the table")
 
 
+def test_restarts_where_the_straight_line_leads_into_an_obstacle(table):
+    arm, obstacles, spheres, tasks = table
+    stuck = 0
+    for start, goal in tasks:
+        once, plan, again = (
+            sk.planning.gradient(arm, start, goal, obstacles, spheres=spheres, restarts=restarts) for restarts in (0, 8, 8)
+        )
+        assert np.array_equal(plan.q, again.q)
+        assert plan.status != "failed"
+        q = plan.sample(np.linspace(0.0, plan.duration, 2001))[0]
+        assert np.min(sk.planning.min_distance(spheres, obstacles, q)) > -1e-3
+        if once.status == "failed":
+            stuck += 1
+            # More of them are no worse.
+            few = sk.planning.gradient(arm, start, goal, obstacles, spheres=spheres, restarts=4)
+            assert few.status == "failed" or plan.cost <= few.cost
+        else:
+            assert np.array_equal(plan.q, once.q)
+    assert stuck > 0
+    with pytest.raises(ValueError, match="restarts = -1"):
+        sk.planning.gradient(arm, *tasks[0], restarts=-1)
+
+
+def test_first_guesses_are_from_the_prior():
+    arm, tasks = pairs("ur10", 1)
+    start, goal = tasks[0]
+    start, goal = 0.1 * start, 0.1 * goal  # far from limits
+    planner = _core.SupportPlanner(arm, _core.geometry_aware_cost(arm, 6.0, 1.0), 11)
+    line = np.linspace(start, goal, 11)
+    drawn = [planner.draw(start, goal, deviation=0.5, seed=seed) for seed in range(4000)]
+    off = np.array([guess.states(6) - line for guess in drawn])
+    assert np.all(off[:, [0, -1]] == 0.0)
+    off = off[:, 1:-1].transpose(0, 2, 1).reshape(-1, 9)
+    # A covariance of 24 000 draws is known to 1 % of the variances, 0.25 at most; joints are independent, so are seeds.
+    assert off.T @ off / len(off) == pytest.approx(0.25 * covariance(11), abs=0.25 * 0.05)
+    assert np.mean(off, axis=0) == pytest.approx(np.zeros(9), abs=0.02)
+    assert np.array_equal(planner.draw(start, goal, deviation=0.5, seed=7).states(6), drawn[7].states(6))
+    assert planner.draw(start, goal, deviation=0.0, seed=0).states(6) == pytest.approx(line)
+    with pytest.raises(sk.Error, match="deviation"):
+        planner.draw(start, goal, deviation=-1.0, seed=0)
+
+
 def test_self_collision_may_be_switched_on():
     arm = sk.robots.load("franka_panda")
     rng = np.random.default_rng(1)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import sigmaik as sk
 from sigmaik.experiments import around_table as at
 
 
@@ -19,6 +20,23 @@ def test_free_of_collisions_and_further_from_singularities_with_the_index(seed):
     assert a.kappa.mean() <= b.kappa.mean()
     assert a.q[0] == pytest.approx(scene.start)
     assert a.q[-1] == pytest.approx(scene.goal, abs=1e-12)
+
+
+def test_by_the_gradient():
+    failed = {}
+    for restarts in (0, 4):
+        failed[restarts] = []
+        for seed in range(24):
+            scene = at.load_scene(seed)
+            plan = sk.planning.gradient(
+                scene.chain, scene.start, scene.goal, scene.obstacles, spheres=scene.spheres, restarts=restarts
+            )
+            if plan.status == "failed":
+                failed[restarts].append(seed)
+            else:
+                assert at.along(scene, plan).distance.min() > -1e-3
+    assert failed[0]
+    assert failed[4] == []
 
 
 def test_command(tmp_path, capsys):

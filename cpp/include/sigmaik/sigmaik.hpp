@@ -28,6 +28,7 @@
 ///     constrained_ik.hpp   ConstrainedIk: a pose exactly in part, the rest as limits allow; time scaling (not included)
 ///     planning/time_optimal.hpp  TimeOptimal: motions within limits, away from what a cost marks (not included)
 ///     planning/support_states.hpp  SupportPlanner: smooth motions along which a cost is low, by gradient or samples
+///     planning/batch_cost.hpp    BatchCost: a cost of all support states at once, such as a user's own (not included)
 ///     planning/costs.hpp         costs for both: potentials, manipulability, geometry-aware index (not included)
 ///     planning/cart.hpp          cart_law: where to drive the cart of a cart-mounted arm, clear of a cylinder (not included)
 ///     planning/cart_plane.hpp    plane_cart_law: the same with two linear axes (not included)

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <deque>
 #include <limits>
+#include <numeric>
 #include <random>
 #include <utility>
 
@@ -35,19 +36,46 @@ Matrix covariance(int states) {
   return k / k.diagonal().maxCoeff();
 }
 
+// Standard normal numbers by Box and Muller: the same everywhere.
+class Normal {
+ public:
+  explicit Normal(std::uint64_t seed) : engine_(seed) {}
+
+  double operator()() {
+    if (spare_) {
+      spare_ = false;
+      return second_;
+    }
+    const double radius = std::sqrt(-2.0 * std::log(uniform())), angle = 2.0 * M_PI * uniform();
+    second_ = radius * std::sin(angle);
+    spare_ = true;
+    return radius * std::cos(angle);
+  }
+
+ private:
+  double uniform() { return (static_cast<double>(engine_() >> 11) + 0.5) * 0x1p-53; }
+
+  std::mt19937_64 engine_;
+  bool spare_ = false;
+  double second_ = 0.0;
+};
+
 }  // namespace
 
 struct SupportPlanner::Work {
   Chain chain;
-  JointCostPtr cost;
+  BatchCostPtr cost;
   int states, n, m;
   Matrix factor;     // C, lower
   Matrix smoothing;  // K̄ with each column's largest entry 1/N (16)
   Matrix line;       // μ
+  Matrix noise;
   JointVector lower, upper;
-  JointVector scratch, gradient;
+  // What the cost is asked, and says, in C order.
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> rows, gradients;
+  Eigen::VectorXd values;
 
-  Work(Chain c, JointCostPtr l, int count)
+  Work(Chain c, BatchCostPtr l, int count)
       : chain(std::move(c)), cost(std::move(l)), states(count), n(chain.dof()), m(count - 2) {
     require(states >= 3 && states <= 1000, "states = ", states, " must be in [3, 1000]");
     require(cost != nullptr, "there is no cost");
@@ -57,8 +85,10 @@ struct SupportPlanner::Work {
     smoothing = k * (k.colwise().maxCoeff() * (states - 1.0)).cwiseInverse().asDiagonal();
     lower = chain.limits().lower;
     upper = chain.limits().upper;
-    scratch.resize(n);
-    gradient.resize(n);
+    noise.resize(m, n);
+    rows.resize(m, n);
+    gradients.resize(m, n);
+    values.resize(m);
   }
 
   void begin(const JointVector& start, const JointVector& goal) {
@@ -80,23 +110,27 @@ struct SupportPlanner::Work {
     for (int j = 0; j < n; ++j) q.col(j) = q.col(j).cwiseMax(lower[j]).cwiseMin(upper[j]);
   }
 
-  double value(const Matrix& q) {
-    double sum = 0.0;
-    for (int i = 0; i < m; ++i) {
-      scratch = q.row(i).transpose();
-      sum += cost->value(scratch);
+  // From the prior about `mean`, of standard deviation `deviation` half-way, on limits where it is beyond them.
+  void draw(Normal& normal, const Matrix& mean, double deviation, Matrix& out) {
+    for (int j = 0; j < n; ++j) {
+      for (int i = 0; i < m; ++i) noise(i, j) = normal();
     }
-    return sum;
+    out.noalias() = factor.triangularView<Eigen::Lower>() * noise;
+    out = mean + deviation * out;
+    clip(out);
+  }
+
+  double value(const Matrix& q) {
+    rows = q;
+    cost->evaluate(static_cast<std::size_t>(m), rows.data(), values.data(), nullptr);
+    return std::accumulate(values.begin(), values.end(), 0.0);
   }
 
   double slopes(const Matrix& q, Matrix& out) {
-    double sum = 0.0;
-    for (int i = 0; i < m; ++i) {
-      scratch = q.row(i).transpose();
-      sum += cost->gradient(scratch, gradient);
-      out.row(i) = gradient.transpose();
-    }
-    return sum;
+    rows = q;
+    cost->evaluate(static_cast<std::size_t>(m), rows.data(), values.data(), gradients.data());
+    out = gradients;
+    return std::accumulate(values.begin(), values.end(), 0.0);
   }
 
   Matrix whiten(const Matrix& q) const { return factor.triangularView<Eigen::Lower>().solve(q - line); }
@@ -117,7 +151,7 @@ struct SupportPlanner::Work {
   }
 };
 
-SupportPlanner::SupportPlanner(Chain chain, JointCostPtr cost, int states)
+SupportPlanner::SupportPlanner(Chain chain, BatchCostPtr cost, int states)
     : work_(std::make_unique<Work>(std::move(chain), std::move(cost), states)) {}
 SupportPlanner::~SupportPlanner() = default;
 SupportPlanner::SupportPlanner(SupportPlanner&&) noexcept = default;
@@ -237,27 +271,13 @@ SupportStates SupportPlanner::stochastic(const JointVector& start, const JointVe
   require_number("tolerance", options.tolerance, 0.0, false);
   w.begin(start, goal);
 
-  std::mt19937_64 engine(options.seed);
-  const auto uniform = [&engine] { return (static_cast<double>(engine() >> 11) + 0.5) * 0x1p-53; };
-  bool spare = false;
-  double second = 0.0;
-  const auto normal = [&] {  // Box and Muller's: the same everywhere
-    if (spare) {
-      spare = false;
-      return second;
-    }
-    const double radius = std::sqrt(-2.0 * std::log(uniform())), angle = 2.0 * M_PI * uniform();
-    second = radius * std::sin(angle);
-    spare = true;
-    return radius * std::cos(angle);
-  };
-
+  Normal normal(options.seed);
   const auto objective = [&](const Matrix& q, double& states_cost) {
     states_cost = w.value(q);
     return states_cost + (options.prior_weight > 0.0 ? options.prior_weight * w.whiten(q).squaredNorm() : 0.0);
   };
 
-  Matrix q = w.line, best = q, noise(w.m, w.n), sample(w.m, w.n), move(w.m, w.n);
+  Matrix q = w.line, best = q, sample(w.m, w.n), move(w.m, w.n);
   double best_cost = 0.0, least = objective(q, best_cost), deviation = options.deviation;
   std::vector<Matrix> moves(static_cast<std::size_t>(options.samples), Matrix(w.m, w.n));
   std::vector<double> values(static_cast<std::size_t>(options.samples));
@@ -267,12 +287,7 @@ SupportStates SupportPlanner::stochastic(const JointVector& start, const JointVe
   for (; iteration < options.max_iterations && !converged; ++iteration) {
     double low = std::numeric_limits<double>::infinity(), high = -low;
     for (std::size_t k = 0; k < values.size(); ++k) {
-      for (int j = 0; j < w.n; ++j) {
-        for (int i = 0; i < w.m; ++i) noise(i, j) = normal();
-      }
-      sample.noalias() = w.factor.triangularView<Eigen::Lower>() * noise;
-      sample = q + deviation * sample;
-      w.clip(sample);
+      w.draw(normal, q, deviation, sample);
       double states_cost;
       values[k] = objective(sample, states_cost);
       if (values[k] < least) {
@@ -310,6 +325,17 @@ SupportStates SupportPlanner::stochastic(const JointVector& start, const JointVe
     }
   }
   return w.result(start, goal, best, best_cost, iteration, converged);
+}
+
+SupportStates SupportPlanner::draw(const JointVector& start, const JointVector& goal, double deviation,
+                                   std::uint64_t seed) {
+  Work& w = *work_;
+  require_number("deviation", deviation, 0.0, false);
+  w.begin(start, goal);
+  Normal normal(seed);
+  Matrix q(w.m, w.n);
+  w.draw(normal, w.line, deviation, q);
+  return w.result(start, goal, q, w.value(q), 0, false);
 }
 
 // Tridiagonal: v_{i−1} + 4 v_i + v_{i+1} = 3 (q_{i+1} − q_{i−1})/h, and 2 v_0 + v_1 = 3 (q_1 − q_0)/h at the ends.

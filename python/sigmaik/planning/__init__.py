@@ -22,6 +22,7 @@ from sigmaik._core import (
     sum_of_costs,
 )
 
+from .batch_cost import BatchCost
 from .cart import CartError, CartMotion, CartRegion, cart_motion, evaluate_cart_motion
 from .cart_plane import PlaneCartMotion, cart_motion_plane, evaluate_cart_motion_plane
 from .cart_trajectory import CartTrajectory, ShoulderCylinder, cart_trajectory, shoulder_cylinder
@@ -34,6 +35,7 @@ from .trajectory import Trajectory
 
 __all__ = [
     "ArmSpheres",
+    "BatchCost",
     "Box",
     "CartError",
     "CartMotion",

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from sigmaik import _core, indices, singularities
 from sigmaik._core import ArmSpheres, Chain, DistanceField, JointCost
 
+from .batch_cost import BatchCost
 from .clearance import clearance
 from .collision import arm_spheres, collision_cost, min_distance
 from .obstacles import Obstacles
@@ -24,6 +25,9 @@ __all__ = ["Index", "gradient", "stochastic"]
 
 Array = NDArray[np.float64]
 Index = Literal["geometry_aware", "manipulability"]
+
+DEVIATION = 0.5
+"""[rad or m] Half-way, of first guesses and of samples."""
 
 DENSE = 10
 """Samples of a step where clearance is measured."""
@@ -38,7 +42,7 @@ def gradient(
     index: Index | None = "geometry_aware",
     weight: float = 1.0,
     k: float | None = None,
-    costs: tuple[JointCost, ...] = (),
+    costs: tuple[JointCost | BatchCost, ...] = (),
     spheres: ArmSpheres | None = None,
     margin: float = 0.05,
     obstacle_weight: float = 1e4,
@@ -47,6 +51,7 @@ def gradient(
     prior_weight: float = 10.0,
     max_iterations: int = 100,
     tolerance: float = 1e-4,
+    restarts: int = 8,
     duration: float | None = None,
 ) -> Trajectory:
     """A smooth motion from start to goal along which an index is good, by the gradient of its cost.
@@ -76,7 +81,11 @@ def gradient(
     k
         by default `indices.reference_scale(chain)`.
     costs
-        Further costs of the states, added up.
+        Further costs of the states, added up: any `JointCost`, or one written in Python (`BatchCost`).
+    restarts
+        ≥ 0. Where the motion found from the straight line touches an obstacle, so many others are found from first guesses
+        drawn from the prior, the same each time, with a standard deviation of 0.5 rad or m half-way, and the one of least
+        cost that touches none is the answer.
     duration
         [s]; by default the shortest that keeps the limits of velocity and acceleration, 1 s where there are none.
 
@@ -89,16 +98,32 @@ def gradient(
     Raises
     ------
     ValueError
-        where an end or an option is out of its range.
+        where an end or an option is out of its range, or a cost's answer has another shape or is not finite. What a cost
+        written in Python raises comes through as it is.
     """
+    if restarts < 0:
+        raise ValueError(f"restarts = {restarts} must be at least 0")
     scene = _Scene.of(chain, obstacles, spheres, margin, obstacle_weight, self_collision, start, goal)
     planner = _planner(chain, index, weight, k, states, (*costs, *scene.costs))
     begin = time.perf_counter()
-    found = planner.gradient(
-        start, goal, prior_weight=prior_weight, max_iterations=max_iterations, tolerance=tolerance
-    )
-    solve_time = time.perf_counter() - begin
-    return _trajectory(chain, found, prior_weight, "optimal" if found.converged else "feasible", duration, solve_time, scene)
+
+    def plan(guess: _core.SupportStates | None) -> Trajectory:
+        found = planner.gradient(
+            start, goal, prior_weight=prior_weight, max_iterations=max_iterations, tolerance=tolerance, guess=guess
+        )
+        solve_time = time.perf_counter() - begin
+        return _trajectory(
+            chain, found, prior_weight, "optimal" if found.converged else "feasible", duration, solve_time, scene
+        )
+
+    best = plan(None)
+    if best.status != "failed":
+        return best
+    for seed in range(restarts):
+        other = plan(planner.draw(start, goal, deviation=DEVIATION, seed=seed))
+        if other.status != "failed" and not best.cost <= other.cost:
+            best = other
+    return replace(best, solve_time=time.perf_counter() - begin)
 
 
 def stochastic(
@@ -111,7 +136,7 @@ def stochastic(
     index: Index | None = "geometry_aware",
     weight: float = 1.0,
     k: float | None = None,
-    costs: tuple[JointCost, ...] = (),
+    costs: tuple[JointCost | BatchCost, ...] = (),
     spheres: ArmSpheres | None = None,
     margin: float = 0.05,
     obstacle_weight: float = 1e4,
@@ -119,7 +144,7 @@ def stochastic(
     states: int = 21,
     samples: int = 10,
     max_iterations: int = 30,
-    deviation: float = 0.5,
+    deviation: float = DEVIATION,
     decay: float = 0.98,
     temperature: float = 0.1,
     prior_weight: float = 10.0,
@@ -198,14 +223,16 @@ def _planner(
     weight: float,
     k: float | None,
     states: int,
-    further: tuple[JointCost, ...],
+    further: tuple[JointCost | BatchCost, ...],
 ) -> _core.SupportPlanner:
     if index is not None and not further:
         return _planners.get(chain, index, weight, k, states)
     own = [] if index is None else [_index_cost(chain, index, weight, k)]
     if not own and not further:
         raise ValueError("there is no cost: index is None, and neither obstacles nor other costs are given")
-    return _core.SupportPlanner(chain, _core.sum_of_costs([*own, *further]), states)
+    python = [cost for cost in further if not isinstance(cost, JointCost)]
+    own += [cost for cost in further if isinstance(cost, JointCost)]
+    return _core.SupportPlanner(chain, _core.sum_of_costs(own) if own else None, states, python)
 
 
 @dataclass(frozen=True)

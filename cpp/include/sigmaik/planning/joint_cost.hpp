@@ -5,18 +5,14 @@
 #include <cstddef>
 #include <memory>
 
+#include <sigmaik/planning/batch_cost.hpp>
 #include <sigmaik/types.hpp>
 
 namespace sigmaik::planning {
 
 /// A cost of joint positions with its derivatives. Immutable, safe to use from many threads.
-class JointCost {
+class JointCost : public BatchCost {
  public:
-  virtual ~JointCost() = default;
-
-  /// Number of joints, n.
-  virtual int dof() const noexcept = 0;
-
   /// Cost at q (n,), finite for finite q. Real time.
   virtual double value(const JointRef& q) const noexcept = 0;
 
@@ -25,6 +21,9 @@ class JointCost {
 
   /// Cost, with gradient (n,). Real time; by default what model() says.
   virtual double gradient(const JointRef& q, JointVector& gradient) const noexcept;
+
+  /// One configuration after another. Real time.
+  void evaluate(std::size_t count, const double* q, double* value, double* gradient) const noexcept final;
 };
 
 /// Shared by the plans that use it; null costs nothing.

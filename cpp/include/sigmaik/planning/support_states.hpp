@@ -13,7 +13,8 @@
 #include <vector>
 
 #include <sigmaik/chain.hpp>
-#include <sigmaik/planning/joint_cost.hpp>
+#include <sigmaik/planning/batch_cost.hpp>
+#include <sigmaik/types.hpp>
 
 namespace sigmaik::planning {
 
@@ -49,14 +50,14 @@ struct StochasticOptions {
 class SupportPlanner {
  public:
   /// \throws Error where the number of states is out of its range, or the cost is for another number of joints
-  SupportPlanner(Chain chain, JointCostPtr cost, int states);
+  SupportPlanner(Chain chain, BatchCostPtr cost, int states);
   ~SupportPlanner();
   SupportPlanner(SupportPlanner&&) noexcept;
   SupportPlanner& operator=(SupportPlanner&&) noexcept;
 
   /// Minimises Σ cost(q_i) + w ‖q − μ‖² in K̄⁻¹ by L-BFGS in x, q = μ + C x, K̄ = C Cᵀ, from `guess` (states, n), or from the
   /// straight line where that is empty. States are kept within the limits by projection.
-  /// \throws Error where an option is out of its range, or an end outside the limits
+  /// \throws Error where an option is out of its range, or an end outside the limits; what the cost throws
   SupportStates gradient(const JointVector& start, const JointVector& goal, const GradientOptions& options,
                          const std::vector<double>& guess = {});
 
@@ -64,6 +65,11 @@ class SupportPlanner {
   /// met. The same for the same seed.
   /// \throws Error as gradient()
   SupportStates stochastic(const JointVector& start, const JointVector& goal, const StochasticOptions& options);
+
+  /// A motion drawn from the prior about the straight line, of standard deviation `deviation` [rad or m] ≥ 0 half-way, its
+  /// states projected on the limits: a first guess. The same for the same seed.
+  /// \throws Error as gradient()
+  SupportStates draw(const JointVector& start, const JointVector& goal, double deviation, std::uint64_t seed);
 
   int states() const noexcept;
   const Chain& chain() const noexcept;
