@@ -258,7 +258,7 @@ def trajectory_figure(trajectory: Trajectory, chain: Chain | None = None) -> Fig
     t = np.append((nodes[:-1, None] + np.diff(nodes)[:, None] * parts).ravel(), nodes[-1])
     q, qdot, qddot = trajectory.sample(t)
     names = chain.joint_names if chain is not None else tuple(f"joint {i + 1}" for i in range(n))
-    unit = {True: "m", False: "rad", None: "rad or m"}[_prismatic(chain)]
+    units = _joint_units(chain)
 
     middle, position, velocity, acceleration = np.zeros(n), np.full(n, np.inf), np.full(n, np.inf), np.full(n, np.inf)
     if chain is not None:
@@ -266,22 +266,22 @@ def trajectory_figure(trajectory: Trajectory, chain: Chain | None = None) -> Fig
         position, velocity, acceleration = 0.5 * (limits.upper - limits.lower), limits.velocity, limits.acceleration
         np.add(limits.lower, position, out=middle, where=np.isfinite(position))
     rows = (
-        ("position", unit, "middle 0, limits ±1", q - middle, position, "default"),
-        ("speed", f"{unit}/s", "/ limit", qdot, velocity, "default"),
-        ("acceleration", f"{unit}/s²", "/ limit", qddot, acceleration, "default" if trajectory.cubic else "steps-post"),
+        ("position", "", "middle 0, limits ±1", q - middle, position, "default"),
+        ("speed", "/s", "/ limit", qdot, velocity, "default"),
+        ("acceleration", "/s²", "/ limit", qddot, acceleration, "default" if trajectory.cubic else "steps-post"),
     )
     count = 3 if chain is None else 5
     figure = Figure(figsize=(8.0, 1.9 * count + 1.0), layout="constrained")
     FigureCanvasAgg(figure)
     panels: list[Axes] = list(figure.subplots(count, 1, sharex=True))
-    for axes, (what, raw, part, values, limit, style) in zip(panels[:3], rows, strict=True):
+    for axes, (what, per, part, values, limit, style) in zip(panels[:3], rows, strict=True):
         known = np.isfinite(limit) & (limit > 0.0)
         scaled = bool(known.any())
         if scaled:
             values = values / np.where(known, limit, 1.0)
             _limit_lines(axes, max(1.15, 1.05 * float(np.abs(values[:, known]).max())), f"joint {what}\n{part}")
         else:
-            axes.set_ylabel(f"joint {what}\n[{raw}]")
+            axes.set_ylabel(f"joint {what}\n[{' or '.join(unit + per for unit in units)}]")
             axes.grid(True, color="0.9", linewidth=0.6)
         for joint in np.flatnonzero(known) if scaled else range(n):
             axes.plot(t, values[:, joint], label=names[joint], drawstyle=style, linewidth=1.2, **_joint_style(int(joint)))
@@ -322,16 +322,14 @@ def trajectory_figure(trajectory: Trajectory, chain: Chain | None = None) -> Fig
 
 
 def _joint_style(joint: int) -> dict[str, Any]:
-    return {
-        "color": _JOINTS[joint % len(_JOINTS)],
-        "linestyle": _DASHES[joint // len(_JOINTS)],
-    }
+    return {"color": _JOINTS[joint % len(_JOINTS)], "linestyle": _DASHES[joint // len(_JOINTS)]}
 
 
-def _prismatic(chain: Chain | None) -> bool | None:
-    """Whether all joints are, or none is; None where they differ, or nobody knows."""
-    kinds = {kind == "prismatic" for kind in chain.joint_types} if chain is not None else set()
-    return kinds.pop() if len(kinds) == 1 else None
+def _joint_units(chain: Chain | None) -> tuple[str, ...]:
+    """Of positions; both where nobody knows the joints."""
+    if chain is None:
+        return ("rad", "m")
+    return tuple(dict.fromkeys("m" if kind == "prismatic" else "rad" for kind in chain.joint_types))
 
 
 def _tool_path(axes: Axes, trace: Trace, here: NDArray[np.bool_], plane: tuple[int, int]) -> None:
