@@ -301,8 +301,17 @@ def trajectory_figure(trajectory: Trajectory, chain: Chain | None = None) -> Fig
             for crossing in trajectory.clearance.crossings if trajectory.clearance is not None else ():
                 axes.axvline(crossing.t, color="#D55E00", linewidth=0.9, linestyle=(0, (4, 3)))
                 if axes is panels[3]:
-                    note: dict[str, Any] = {"transform": axes.get_xaxis_transform(), "va": "top", "rotation": 90}
-                    axes.text(crossing.t, 0.97, f" {crossing.name}", color="#D55E00", fontsize=8, ha="left", **note)
+                    axes.annotate(
+                        crossing.name,
+                        (crossing.t, 0.97),
+                        xycoords=axes.get_xaxis_transform(),
+                        xytext=(3.0, 0.0),
+                        textcoords="offset points",
+                        va="top",
+                        rotation=90,
+                        color="#D55E00",
+                        fontsize=8,
+                    )
     for axes in panels:
         axes.spines[["top", "right"]].set_visible(False)
         axes.tick_params(labelsize=8)

@@ -70,7 +70,7 @@ def test_crossings_are_named():
     bent = np.array([0.1, 0.5, 0.1, 1.2, 0.1, 0.8, 0.1])
     crossing = sk.planning.time_optimal(iiwa, bent, bent * [1, 1, 1, -1, 1, 1, 1])
     assert crossing.clearance.crossings
-    texts = [text.get_text().strip() for text in plots.trajectory_figure(crossing, iiwa).axes[3].texts]
+    texts = [text.get_text() for text in plots.trajectory_figure(crossing, iiwa).axes[3].texts]
     assert texts == [c.name for c in crossing.clearance.crossings]
 
 
