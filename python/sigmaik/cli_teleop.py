@@ -145,8 +145,9 @@ def _drill(console: Console) -> int:
     console.print(table)
     broken = sum(row.broken for row in rows)
     console.print(
-        f"speed: the largest, of its limit. broken: joints times cycles beyond a limit of position, velocity or\n"
-        f"acceleration. error: from home, at the end. {sum(row.cycles for row in rows)} cycles, {broken} broken limits",
+        f"speed: the largest, of its limit. broken: joints times cycles beyond a limit of\n"
+        f"position, velocity or acceleration. error: from home, at the end.\n"
+        f"{sum(row.cycles for row in rows)} cycles, {broken} limits broken",
         highlight=False,
     )
     return 0

@@ -1,6 +1,6 @@
 """Driving an arm by hand: a servo in a thread of its own, its commands, its settings, and recordings.
 
-    session = sk.teleop.Session("ufactory_xarm7")
+    session = sigmaik.teleop.Session("ufactory_xarm7")
     with session:                                  # starts the servo, and stops it
         session.start_recording()
         session.follow(target)                     # (4, 4); or session.twist([vx, vy, vz, wx, wy, wz])

@@ -348,8 +348,14 @@ class Page:
         ticks = 0
         due = time.monotonic()
         while not self._closed.is_set():
-            with contextlib.suppress(Exception) if self._closed.is_set() else contextlib.nullcontext():
+            try:
                 self._draw_once(ticks)
+            except Exception:
+                if self._closed.is_set():  # the server went first
+                    return
+                self.session.hold()
+                self._closed.set()
+                raise
             ticks += 1
             due = max(due + 1.0 / DRAWN, time.monotonic())
             self._closed.wait(due - time.monotonic())
@@ -400,11 +406,14 @@ class Page:
             client = self._server.get_clients().get(self._driver) if self._driver is not None else None
             if client is None or self.session.goal is None:
                 continue
+            patience = max(self.session.pose_timeout - 2.0 * HEARTBEAT, 0.5 * self.session.pose_timeout)
             try:
-                client.local_storage.get_item("sigmaik", timeout=self.session.pose_timeout)
+                client.local_storage.get_item("sigmaik", timeout=patience)
             except (TimeoutError, RuntimeError):
-                continue  # the pose goes stale
-            self.session.refresh()
+                self._driver = None
+                self._hold()  # until a new target is given
+            else:
+                self.session.refresh()
 
     def _lost(self, client: viser.ClientHandle) -> None:
         """A browser is gone."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 import pathlib
 import threading
@@ -243,10 +242,6 @@ class Session:
                 {number: s for number, s in self._history.items() if number in used},
                 before,
             )
-
-    def describe(self) -> dict[str, Any]:
-        """Settings as plain values."""
-        return dataclasses.asdict(self._settings)
 
 
 def _power_of_two(least: float) -> int:
