@@ -1,4 +1,4 @@
-"""Figures of experiments, in the style of the J-PARSE paper's. Needs matplotlib, of the extra "demo".
+"""Figures of experiments, in the style of the J-PARSE paper's, and of planned motions. Needs matplotlib, of the extra "plot".
 
 Nothing here needs a display, and pyplot's global state is left alone.
 """
@@ -18,14 +18,17 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image
 
-from .experiments.storage import write_atomically
+from . import indices
+from .files import write_atomically
 
 if TYPE_CHECKING:
+    from ._core import Chain
     from .experiments.limits import Trace
     from .experiments.methods import NamedMethod
     from .experiments.reach import Run
+    from .planning import Trajectory
 
-__all__ = ["experiment_figure", "limits_figure", "method_colour", "save_figure"]
+__all__ = ["experiment_figure", "limits_figure", "method_colour", "save_figure", "trajectory_figure"]
 
 Array = NDArray[np.float64]
 
@@ -186,7 +189,9 @@ def limits_figure(traces: Sequence[Trace], seconds: tuple[float, float] | None =
                     linewidth=0.9,
                     label=chain.joint_names[joint],
                 )
-            _limit_lines(axes, trace, top, label if column == 0 else None)
+            _limit_lines(axes, top, label if column == 0 else None)
+            for phase in trial.phases[1:]:
+                axes.axvline(phase.begin / trace.experiment.settings.rate, color="0.7", linewidth=0.8, zorder=0.5)
             if not known.any():
                 axes.text(
                     0.5,
@@ -220,17 +225,120 @@ def limits_figure(traces: Sequence[Trace], seconds: tuple[float, float] | None =
     return figure
 
 
-def _limit_lines(axes: Axes, trace: Trace, top: float, label: str | None) -> None:
+def _limit_lines(axes: Axes, top: float, label: str | None) -> None:
     for sign in (-1.0, 1.0):
         axes.axhline(sign, color="0.25", linewidth=0.9, linestyle=(0, (4, 3)))
         axes.axhspan(sign, sign * top, color="0.93", zorder=0)
-    for phase in trace.trial.phases[1:]:
-        axes.axvline(phase.begin / trace.experiment.settings.rate, color="0.7", linewidth=0.8, zorder=0.5)
     axes.set_ylim(-top, top)
     axes.spines[["top", "right"]].set_visible(False)
     axes.tick_params(labelsize=8, labelleft=label is not None)
     if label is not None:
         axes.set_ylabel(label)
+
+
+_STEP_SAMPLES = 10  # drawn between two samples of a trajectory
+
+
+def trajectory_figure(trajectory: Trajectory, chain: Chain | None = None) -> Figure:
+    """Positions, speeds and accelerations of all joints over time, between the trajectory's samples too, a line per joint.
+
+    With a chain they are parts of its limits, ±1, the middle of a position's range being 0; a joint without the limit is
+    named and not drawn, and where no joint has one the unit is the joint's. Below are σ_min and manipulability √det(JJᵀ)
+    along the way, with what the trajectory knows of singular sets that it crosses.
+
+    ValueError where the trajectory is empty or the chain has other joints.
+    """
+    if trajectory.t.size == 0:
+        raise ValueError(f"nothing to draw: the trajectory is empty, its plan {trajectory.status}")
+    n = trajectory.q.shape[1]
+    if chain is not None and chain.dof != n:
+        raise ValueError(f"the trajectory has {n} joints, the chain {chain.dof}")
+    nodes = trajectory.t
+    parts = np.linspace(0.0, 1.0, _STEP_SAMPLES, endpoint=False)
+    t = np.append((nodes[:-1, None] + np.diff(nodes)[:, None] * parts).ravel(), nodes[-1])
+    q, qdot, qddot = trajectory.sample(t)
+    names = chain.joint_names if chain is not None else tuple(f"joint {i + 1}" for i in range(n))
+    units = _joint_units(chain)
+
+    middle, position, velocity, acceleration = np.zeros(n), np.full(n, np.inf), np.full(n, np.inf), np.full(n, np.inf)
+    if chain is not None:
+        limits = chain.limits
+        position, velocity, acceleration = 0.5 * (limits.upper - limits.lower), limits.velocity, limits.acceleration
+        np.add(limits.lower, position, out=middle, where=np.isfinite(position))
+    rows = (
+        ("position", "", "middle 0, limits ±1", q - middle, position, "default"),
+        ("speed", "/s", "/ limit", qdot, velocity, "default"),
+        ("acceleration", "/s²", "/ limit", qddot, acceleration, "default" if trajectory.cubic else "steps-post"),
+    )
+    count = 3 if chain is None else 5
+    figure = Figure(figsize=(8.0, 1.9 * count + 1.0), layout="constrained")
+    FigureCanvasAgg(figure)
+    panels: list[Axes] = list(figure.subplots(count, 1, sharex=True))
+    for axes, (what, per, part, values, limit, style) in zip(panels[:3], rows, strict=True):
+        known = np.isfinite(limit) & (limit > 0.0)
+        scaled = bool(known.any())
+        if scaled:
+            values = values / np.where(known, limit, 1.0)
+            _limit_lines(axes, max(1.15, 1.05 * float(np.abs(values[:, known]).max())), f"joint {what}\n{part}")
+        else:
+            axes.set_ylabel(f"joint {what}\n[{' or '.join(unit + per for unit in units)}]")
+            axes.grid(True, color="0.9", linewidth=0.6)
+        for joint in np.flatnonzero(known) if scaled else range(n):
+            axes.plot(t, values[:, joint], label=names[joint], drawstyle=style, linewidth=1.2, **_joint_style(int(joint)))
+        if scaled and not known.all():
+            missing = ", ".join(names[joint] for joint in np.flatnonzero(~known))
+            axes.set_title(f"without limit, not drawn: {missing}", fontsize=8, color="0.35", loc="right")
+    if chain is not None:
+        jacobians = chain.jacobian(q)
+        for axes, label, index in (
+            (panels[3], r"$\sigma_{min}$", indices.min_singular_value),
+            (panels[4], "manipulability\n" + r"$\sqrt{\det JJ^T}$", indices.manipulability),
+        ):
+            axes.plot(t, index(jacobians), color="black", linewidth=1.2)
+            axes.set_ylim(bottom=0.0)
+            axes.set_ylabel(label)
+            axes.grid(True, color="0.9", linewidth=0.6)
+            for crossing in trajectory.clearance.crossings if trajectory.clearance is not None else ():
+                axes.axvline(crossing.t, color="#D55E00", linewidth=0.9, linestyle=(0, (4, 3)))
+                if axes is panels[3]:
+                    axes.annotate(
+                        crossing.name,
+                        (crossing.t, 0.97),
+                        xycoords=axes.get_xaxis_transform(),
+                        xytext=(3.0, 0.0),
+                        textcoords="offset points",
+                        va="top",
+                        rotation=90,
+                        color="#D55E00",
+                        fontsize=8,
+                    )
+    for axes in panels:
+        axes.spines[["top", "right"]].set_visible(False)
+        axes.tick_params(labelsize=8)
+    panels[-1].set_xlabel("time [s]")
+    if t[-1] > t[0]:
+        panels[-1].set_xlim(t[0], t[-1])
+    shown = {label: handle for axes in panels[:3] for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)}
+    figure.legend(
+        [shown[name] for name in names if name in shown],
+        [name for name in names if name in shown],
+        loc="outside lower center",
+        ncols=min(len(shown), 8),
+        frameon=False,
+        fontsize=9,
+    )
+    return figure
+
+
+def _joint_style(joint: int) -> dict[str, Any]:
+    return {"color": _JOINTS[joint % len(_JOINTS)], "linestyle": _DASHES[joint // len(_JOINTS)]}
+
+
+def _joint_units(chain: Chain | None) -> tuple[str, ...]:
+    """Of positions; both where nobody knows the joints."""
+    if chain is None:
+        return ("rad", "m")
+    return tuple(dict.fromkeys("m" if kind == "prismatic" else "rad" for kind in chain.joint_types))
 
 
 def _tool_path(axes: Axes, trace: Trace, here: NDArray[np.bool_], plane: tuple[int, int]) -> None:

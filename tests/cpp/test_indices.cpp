@@ -196,6 +196,7 @@ TEST_CASE("what is refused") {
                   Error);
 }
 
+#ifdef SIGMAIK_TEST_HEAP
 TEST_CASE("no heap") {
   const Chain& chain = test::arms().at("franka_panda");
   const JointVector q = JointVector::Constant(7, 0.5);
@@ -211,3 +212,4 @@ TEST_CASE("no heap") {
     CHECK(sum > 0.0);
   }
 }
+#endif

@@ -279,6 +279,7 @@ TEST_CASE("potentials of any height") {
   }
 }
 
+#ifdef SIGMAIK_TEST_HEAP
 TEST_CASE("no heap") {
   Random random(7);
   const SingularSets sets = SingularSets::load("franka_panda");
@@ -296,3 +297,4 @@ TEST_CASE("no heap") {
   CHECK(heap.calls() == 0);
   CHECK(sum > 0.0);
 }
+#endif

@@ -316,18 +316,3 @@ def test_retimed():
         assert slow.clearance.min_manipulability == plan.clearance.min_manipulability
         with pytest.raises(ValueError, match="duration"):
             plan.retimed(0.0)
-
-
-def test_played_through_the_servo():
-    # The plan's positions as poses, at 1 kHz: the servo follows within its gains, and breaks no limit.
-    arm = sk.robots.load("franka_panda")
-    start = sk.robots.home("franka_panda")
-    goal = start + np.array([0.4, 0.2, -0.3, 0.2, 0.3, -0.2, 0.1])
-    plan = time_optimal(arm, start, goal, time_weight=10.0)
-    servo = sk.Servo(arm, sk.JParse(), dt=1e-3, gain_linear=20.0, gain_angular=20.0, posture=goal, posture_gain=1.0)
-    servo.reset(start)
-    t = np.arange(0.0, plan.duration + 1.0, 1e-3)
-    for pose in arm.pose(plan.sample(t)[0]):
-        step = servo.update(pose)
-        assert np.all(np.abs(step.qdot) <= arm.limits.velocity)
-    assert np.linalg.norm(step.pose_error) < 1e-4

@@ -4,6 +4,9 @@
     trajectory.t, trajectory.q, trajectory.qdot, trajectory.qddot
     trajectory = sk.planning.gradient(chain, start, goal)              # or stochastic: along a good geometry-aware index
     trajectory.clearance.min_manipulability, trajectory.clearance.crossings
+    trajectory.plot("motion.png", chain)
+    done = sk.planning.play(trajectory, servo)                         # a servo that stands at its start
+    done.q, done.max_position_error, done.max_joint_difference
     motion = sk.planning.cart_motion(flange_xy, start, end, radius)   # of the cart under an arm
     motion.x, motion.energy, motion.clearance
     motion = sk.planning.cart_motion_plane(flange_xy, (0, 0), (1, 0), radius)   # with two axes
@@ -29,6 +32,7 @@ from .cart_trajectory import CartTrajectory, ShoulderCylinder, cart_trajectory, 
 from .clearance import Clearance, Crossing
 from .collision import arm_spheres, collision_cost, min_distance
 from .obstacles import Box, Cylinder, Obstacles, Sphere
+from .playing import Playback, play
 from .support import gradient, stochastic
 from .time_optimal import time_optimal
 from .trajectory import Trajectory
@@ -48,6 +52,7 @@ __all__ = [
     "JointCost",
     "Obstacles",
     "PlaneCartMotion",
+    "Playback",
     "ShoulderCylinder",
     "Sphere",
     "Trajectory",
@@ -61,6 +66,7 @@ __all__ = [
     "gradient",
     "joint_limit_cost",
     "min_distance",
+    "play",
     "self_collision_cost",
     "self_collision_pairs",
     "shoulder_cylinder",

@@ -5,13 +5,18 @@ from __future__ import annotations
 import json
 import pathlib
 from dataclasses import asdict, dataclass, field, fields, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sigmaik.console import need
 from sigmaik.files import write_atomically
 
 from .clearance import Clearance, Crossing
+
+if TYPE_CHECKING:
+    from sigmaik import Chain
 
 __all__ = ["Trajectory"]
 
@@ -90,6 +95,20 @@ class Trajectory:
             duration=duration,
             clearance=near,
         )
+
+    def plot(self, file: str | pathlib.Path, chain: Chain | None = None) -> pathlib.Path:
+        """Writes a picture, `plots.trajectory_figure`, as PNG, whole or not at all. Returns its path.
+
+        ValueError where there is nothing to draw, the chain has other joints, or the file's name does not end in .png;
+        console.MissingPackage where matplotlib is not installed.
+        """
+        file = pathlib.Path(file)
+        if file.suffix.lower() != ".png":
+            raise ValueError(f"{file} must end in .png")
+        need("matplotlib", "plot")
+        from sigmaik import plots
+
+        return plots.save_figure(plots.trajectory_figure(self, chain), file)
 
     def save(self, file: str | pathlib.Path) -> pathlib.Path:
         """Writes an npz file that numpy.load reads without pickles, whole or not at all. Returns its path."""
