@@ -28,6 +28,7 @@ _SETTINGS = (
     ("--gain-linear", "gain_linear", "1/S", "position error to velocity"),
     ("--gain-angular", "gain_angular", "1/S", "orientation error to angular velocity"),
     ("--smoothing", "smoothing", "S", "of the stream"),
+    ("--posture-gain", "posture_gain", "1/S", "pull towards home, where the arm is redundant"),
     ("--latency", "latency", "S", "of interpolation; by default the delay, and two pictures and a half"),
     ("--max-speed", "max_speed", "M/S", "of the stream"),
     ("--max-angular-speed", "max_angular_speed", "RAD/S", "of the stream"),
