@@ -30,7 +30,7 @@ from .cli_reaching import add_reaching
 from .cli_table import add_table
 from .cli_teleop import add_teleop
 from .cli_track import add_track
-from .console import MissingPackage, need, terminal
+from .console import MissingPackage, add_arm, add_links, need, terminal
 from .experiments import axis5
 from .experiments.reach import load_arm
 
@@ -102,9 +102,7 @@ def _add_reach(parser: argparse.ArgumentParser) -> None:
         "with a minus need an equals sign: --posture=-0.1,0.2,…"
     )
     arm = parser.add_argument_group("the arm and its way")
-    arm.add_argument("--robot", default="ufactory_xarm7", help="a shipped arm or a URDF file (%(default)s)")
-    arm.add_argument("--base", help="base link (the URDF's root)")
-    arm.add_argument("--tip", help="tip link (the URDF's only leaf)")
+    add_arm(arm)
     arm.add_argument(
         "--path",
         default="extended-line",
@@ -361,11 +359,7 @@ def _add_limits(parser: argparse.ArgumentParser) -> None:
         "as CSV, pictures, and the time series if asked. The last line on stdout is the CSV file's path."
     )
     parser.epilog = "ways: " + "; ".join(f"{name}: {text}" for name, text in ex.VARIANTS.items())
-    parser.add_argument(
-        "--robot", default="ufactory_xarm7", help="a shipped arm or a URDF file (%(default)s)"
-    )
-    parser.add_argument("--base", help="base link (the URDF's root)")
-    parser.add_argument("--tip", help="tip link (the URDF's only leaf)")
+    add_arm(parser)
     parser.add_argument("--method", default="jparse", help="the rule, as for reach (%(default)s)")
     defaults = ex.LimitsSettings()
     for option, kind, unit, text in (
@@ -483,8 +477,7 @@ def _robots(_: argparse.Namespace) -> int:
 def _add_info(parser: argparse.ArgumentParser) -> None:
     parser.description = "Joints, limits, reach, and the pose and singular values at a configuration."
     parser.add_argument("robot", metavar="ARM_OR_URDF", help="a shipped arm or a URDF file")
-    parser.add_argument("--base", help="base link (the URDF's root)")
-    parser.add_argument("--tip", help="tip link (the URDF's only leaf)")
+    add_links(parser)
     parser.add_argument(
         "--q", metavar="Q", default="home", help="home, zero, or a comma list: --q=-0.1,0.2,… (%(default)s)"
     )

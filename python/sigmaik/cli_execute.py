@@ -10,7 +10,7 @@ import numpy as np
 import sigmaik as sk
 
 from .cli_physics import add_arm_options, physics_settings
-from .console import need, terminal
+from .console import add_arm, need, terminal
 from .experiments.reach import load_arm
 
 __all__ = ["add_execute"]
@@ -23,9 +23,7 @@ def add_execute(parser: argparse.ArgumentParser) -> None:
         "used. The last line on stdout is the last file. Needs the extra sim."
     )
     motion = parser.add_argument_group("the motion")
-    motion.add_argument("--robot", default="franka_panda", help="a shipped arm or a URDF file (%(default)s)")
-    motion.add_argument("--base", help="base link (the URDF's root)")
-    motion.add_argument("--tip", help="tip link (the URDF's only leaf)")
+    add_arm(motion, "franka_panda")
     motion.add_argument("--motion", type=int, default=0, metavar="N", help="seed of the two ends (%(default)s)")
     motion.add_argument("--plan", type=pathlib.Path, metavar="FILE", help="a saved trajectory instead")
     motion.add_argument(

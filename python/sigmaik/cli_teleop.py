@@ -7,7 +7,7 @@ import pathlib
 import webbrowser
 from typing import TYPE_CHECKING
 
-from .console import need, terminal
+from .console import add_arm, need, terminal
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -25,9 +25,7 @@ def add_teleop(parser: argparse.ArgumentParser) -> None:
         "cycle can be recorded. The arm stops when the browser that drives it is gone."
     )
     arm = parser.add_argument_group("the arm")
-    arm.add_argument("--robot", default="ufactory_xarm7", help="a shipped arm or a URDF file (%(default)s)")
-    arm.add_argument("--base", help="base link (the URDF's root)")
-    arm.add_argument("--tip", help="tip link (the URDF's only leaf)")
+    add_arm(arm)
     arm.add_argument(
         "--acceleration",
         type=float,

@@ -6,7 +6,7 @@ import argparse
 import dataclasses
 import pathlib
 
-from .console import need, terminal
+from .console import add_arm, need, terminal
 from .experiments import track
 from .experiments.methods import SHORT_NAMES, parse_methods
 from .experiments.settings import Settings
@@ -50,9 +50,7 @@ def add_track(parser: argparse.ArgumentParser) -> None:
         + f". methods: {', '.join(SHORT_NAMES)}, with parameters after a colon (dls:damping=0.8)."
     )  # fmt: skip
     arm = parser.add_argument_group("the arm and its target")
-    arm.add_argument("--robot", default="ufactory_xarm7", help="a shipped arm or a URDF file (%(default)s)")
-    arm.add_argument("--base", help="base link (the URDF's root)")
-    arm.add_argument("--tip", help="tip link (the URDF's only leaf)")
+    add_arm(arm)
     arm.add_argument(
         "--target",
         default="marker",

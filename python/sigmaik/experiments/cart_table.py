@@ -7,13 +7,13 @@ import pathlib
 from collections.abc import Sequence
 
 import numpy as np
-from rich import box
 from rich.table import Table
 from rich.text import Text
 
 from sigmaik.planning.cart import CartMotion
 
 from .cart import METHODS, CartExperiment, CartRun
+from .table import titled_table
 
 __all__ = ["cart_table", "save_cart_table"]
 
@@ -30,14 +30,7 @@ _HEADS = (
 
 def cart_table(e: CartExperiment, runs: Sequence[CartRun]) -> Table:
     """A line per method. Red: samples in the region, a path not followed, joints missed."""
-    table = Table(
-        title=f"{e.variant}: {e.samples} samples, radius {1e3 * e.radius:g} mm",
-        title_justify="left",
-        title_style="bold",
-        box=box.SIMPLE_HEAD,
-        padding=(0, 1, 0, 0),
-        pad_edge=False,
-    )
+    table = titled_table(f"{e.variant}: {e.samples} samples, radius {1e3 * e.radius:g} mm")
     table.add_column("cart")
     for head in _HEADS:
         table.add_column(head, justify="right", no_wrap=True)

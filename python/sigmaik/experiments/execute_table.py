@@ -4,20 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from rich import box
 from rich.table import Table
 
 from .execute import ExecuteRun
-from .table import _compact
+from .table import compact, titled_table
 
 __all__ = ["execute_table"]
 
 
 def execute_table(runs: Sequence[ExecuteRun], title: str) -> Table:
     """A line per way to drive the arm: largest errors of joints and tip, on the way and at the end, and the torques used."""
-    table = Table(
-        title=title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False
-    )
+    table = titled_table(title)
     table.add_column("", no_wrap=True)
     for head in ("error\nmrad", "\nrms", "at the\nend", "tip off\nmm", "at the\nend", "effort\n%", "cut\n% of t"):
         table.add_column(head, justify="right", no_wrap=True)
@@ -25,12 +22,12 @@ def execute_table(runs: Sequence[ExecuteRun], title: str) -> Table:
         done = run.execution
         table.add_row(
             run.variant,
-            _compact(1e3 * done.max_error),
-            _compact(1e3 * done.rms_error),
-            _compact(1e3 * done.final_error),
-            _compact(1e3 * float(run.tip_error.max())),
-            _compact(1e3 * float(run.tip_error[-1])),
-            _compact(100.0 * done.max_effort),
-            _compact(100.0 * done.saturated),
+            compact(1e3 * done.max_error),
+            compact(1e3 * done.rms_error),
+            compact(1e3 * done.final_error),
+            compact(1e3 * float(run.tip_error.max())),
+            compact(1e3 * float(run.tip_error[-1])),
+            compact(100.0 * done.max_effort),
+            compact(100.0 * done.saturated),
         )
     return table

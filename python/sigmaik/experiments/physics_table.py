@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from rich import box
 from rich.table import Table
 from rich.text import Text
 
 from .physics import PhysicsSummary
-from .table import _compact
+from .table import compact, method_table
 
 __all__ = ["physics_table"]
 
@@ -32,18 +31,7 @@ def physics_table(rows: Sequence[PhysicsSummary], title: str) -> Table:
     The settled errors, the largest joint speed, the largest distance between the tips on the way, and the part of the time in
     which any drive was at its effort limit.
     """
-    table = Table(
-        title=title,
-        title_justify="left",
-        title_style="bold",
-        box=box.SIMPLE_HEAD,
-        padding=(0, 1, 0, 0),
-        pad_edge=False,
-    )
-    table.add_column("method", overflow="fold")
-    table.add_column("waypoint")
-    for head in _HEADS:
-        table.add_column(head, justify="right", no_wrap=True)
+    table = method_table(title, "waypoint", _HEADS)
     for i, row in enumerate(rows):
         begins = i == 0 or rows[i - 1].method != row.method
         ends = i + 1 == len(rows) or rows[i + 1].method != row.method
@@ -54,14 +42,14 @@ def physics_table(rows: Sequence[PhysicsSummary], title: str) -> Table:
         table.add_row(
             name,
             row.waypoint,
-            _compact(1e3 * row.position_error),
-            _compact(1e3 * row.physical_position_error),
-            _compact(math.degrees(row.orientation_error)),
-            _compact(math.degrees(row.physical_orientation_error)),
-            _compact(row.max_joint_speed),
-            Text(_compact(row.physical_max_joint_speed), style="red" if fast else ""),
-            _compact(1e3 * row.max_tip_distance),
-            _compact(100.0 * row.saturated),
+            compact(1e3 * row.position_error),
+            compact(1e3 * row.physical_position_error),
+            compact(math.degrees(row.orientation_error)),
+            compact(math.degrees(row.physical_orientation_error)),
+            compact(row.max_joint_speed),
+            Text(compact(row.physical_max_joint_speed), style="red" if fast else ""),
+            compact(1e3 * row.max_tip_distance),
+            compact(100.0 * row.saturated),
             end_section=ends,
         )
     return table

@@ -13,7 +13,7 @@ from .limits import LimitsSummary
 from .reach import Experiment
 from .summary import Summary
 
-__all__ = ["broken_table", "cost_table", "hold_table", "summary_table"]
+__all__ = ["broken_table", "compact", "cost_table", "hold_table", "method_table", "summary_table", "titled_table"]
 
 _HEADS = (
     "pos.\nerror\nmm",
@@ -41,37 +41,24 @@ def summary_table(experiment: Experiment, rows: Sequence[Summary], title: str) -
     the largest distance from the line and its root mean square, the largest errors, and the last two.
     """
     moving = experiment.path.line is not None
-    table = Table(
-        title=title,
-        title_justify="left",
-        title_style="bold",
-        box=box.SIMPLE_HEAD,
-        padding=(0, 1, 0, 0),
-        pad_edge=False,
-    )
-    table.add_column("method", overflow="fold")
-    table.add_column("cycle" if moving else "waypoint")
-    heads = _MOVING_HEADS if moving else _HEADS
-    for head in heads:
-        table.add_column(head, justify="right", no_wrap=True)
-
+    table = method_table(title, "cycle" if moving else "waypoint", _MOVING_HEADS if moving else _HEADS)
     for i, row in enumerate(rows):
-        speed = Text(_compact(row.max_joint_speed), style="red" if row.max_speed_ratio > 1.0 + 1e-9 else "")
+        speed = Text(compact(row.max_joint_speed), style="red" if row.max_speed_ratio > 1.0 + 1e-9 else "")
         if moving:
             cells = [
-                _compact(1e3 * row.max_deviation),
-                _compact(1e3 * row.rms_deviation),
-                _compact(1e3 * row.max_position_error),
-                _compact(math.degrees(row.max_orientation_error)),
+                compact(1e3 * row.max_deviation),
+                compact(1e3 * row.rms_deviation),
+                compact(1e3 * row.max_position_error),
+                compact(math.degrees(row.max_orientation_error)),
             ]
         else:
             settled = "–" if math.isnan(row.settling_time) else f"{row.settling_time:.1f}"
             cells = [
-                _compact(1e3 * row.position_error),
-                _compact(math.degrees(row.orientation_error)),
+                compact(1e3 * row.position_error),
+                compact(math.degrees(row.orientation_error)),
                 settled,
             ]
-        at_rest = [] if moving else [_compact(row.rest_speed)]
+        at_rest = [] if moving else [compact(row.rest_speed)]
         ends = i + 1 == len(rows) or rows[i + 1].method != row.method
         begins = i == 0 or rows[i - 1].method != row.method
         table.add_row(
@@ -86,7 +73,29 @@ def summary_table(experiment: Experiment, rows: Sequence[Summary], title: str) -
     return table
 
 
-def _compact(value: float) -> str:
+def titled_table(title: str | Text) -> Table:
+    """An empty table with a title, as all experiments have it."""
+    return Table(
+        title=title,
+        title_justify="left",
+        title_style="bold",
+        box=box.SIMPLE_HEAD,
+        padding=(0, 1, 0, 0),
+        pad_edge=False,
+    )
+
+
+def method_table(title: str, leg: str, heads: Sequence[str]) -> Table:
+    """An empty table of methods, the legs of a path, and figures."""
+    table = titled_table(title)
+    table.add_column("method", overflow="fold")
+    table.add_column(leg)
+    for head in heads:
+        table.add_column(head, justify="right", no_wrap=True)
+    return table
+
+
+def compact(value: float) -> str:
     """At most five characters, two decimals at most."""
     if not math.isfinite(value):
         return "–"
@@ -125,9 +134,9 @@ def broken_table(rows: Sequence[LimitsSummary]) -> Table:
         cells = [
             Text(cell, style="red" if count else "")
             for count, worst in pairs
-            for cell in (str(count), _compact(worst))
+            for cell in (str(count), compact(worst))
         ]
-        _add(table, rows, i, [*cells, _compact(row.acceleration_peak), _compact(row.acceleration_rms)])
+        _add(table, rows, i, [*cells, compact(row.acceleration_peak), compact(row.acceleration_rms)])
     return table
 
 
@@ -145,12 +154,12 @@ def cost_table(rows: Sequence[LimitsSummary]) -> Table:
         table.add_column(head, justify="right", no_wrap=True)
     for i, row in enumerate(rows):
         cells = [
-            _compact(100.0 * row.limited),
-            _compact(100.0 * row.taken_over),
-            _compact(100.0 * row.achieved),
-            _compact(math.degrees(row.direction_error)),
-            _compact(math.degrees(row.direction_error_worst)),
-            _compact(row.turning_error),
+            compact(100.0 * row.limited),
+            compact(100.0 * row.taken_over),
+            compact(100.0 * row.achieved),
+            compact(math.degrees(row.direction_error)),
+            compact(math.degrees(row.direction_error_worst)),
+            compact(row.turning_error),
         ]
         _add(table, rows, i, cells)
     return table
@@ -172,12 +181,12 @@ def hold_table(rows: Sequence[LimitsSummary]) -> Table:
     rows = [row for row in rows if row.trials]
     for i, row in enumerate(rows):
         cells = [
-            _compact(1e3 * row.hold_error),
-            _compact(math.degrees(row.hold_angle)),
+            compact(1e3 * row.hold_error),
+            compact(math.degrees(row.hold_angle)),
             f"{row.rest_speed:.4f}",
             f"{row.rest_speed_peak:.4f}",
-            _compact(row.resume_time),
-            _compact(row.resume_speed),
+            compact(row.resume_time),
+            compact(row.resume_speed),
             f"{row.returned}/{row.trials}",
         ]
         _add(table, rows, i, cells)
@@ -185,14 +194,7 @@ def hold_table(rows: Sequence[LimitsSummary]) -> Table:
 
 
 def _limits_table(title: str) -> Table:
-    table = Table(
-        title=title,
-        title_justify="left",
-        title_style="bold",
-        box=box.SIMPLE_HEAD,
-        padding=(0, 1, 0, 0),
-        pad_edge=False,
-    )
+    table = titled_table(title)
     table.add_column("", no_wrap=True)
     return table
 

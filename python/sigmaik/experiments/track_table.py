@@ -6,13 +6,13 @@ import math
 from collections.abc import Sequence
 from typing import Literal
 
-from rich import box
 from rich.table import Table
 from rich.text import Text
 
 from .track import TrackExperiment, TrackSummary
 
 By = Literal["method", "mode"]
+from .table import titled_table
 
 __all__ = ["error_table", "event_table", "headline", "motion_table"]
 
@@ -75,9 +75,7 @@ def event_table(rows: Sequence[TrackSummary]) -> Table:
 
 
 def _table(title: str) -> Table:
-    table = Table(
-        title=Text(title), title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False
-    )
+    table = titled_table(Text(title))
     table.add_column("", no_wrap=True)
     return table
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import io
 import pathlib
 import threading
 import time
@@ -24,6 +25,7 @@ from sigmaik.experiments import methods
 from . import gauges
 from .devices import DEVICES, TwistDevice, open_device
 from .episode import Episode
+from .scene import Scene, pose_of
 from .session import Session
 
 if TYPE_CHECKING:
@@ -66,8 +68,6 @@ class Page:
         if parquet:
             need("pyarrow", "viewer")
         import viser
-
-        from .scene import Scene
 
         self.session, self.directory, self.parquet = session, pathlib.Path(directory), parquet
         with _quiet():
@@ -133,7 +133,7 @@ class Page:
         @self._scene.target.on_update
         def _(event: Any) -> None:
             target = self._scene.target
-            self._guard(event, lambda: self._follow(event, _pose(target.position, target.wxyz)))
+            self._guard(event, lambda: self._follow(event, pose_of(target.position, target.wxyz)))
 
     def _build_drive(self) -> None:
         gui = self._server.gui
@@ -275,7 +275,7 @@ class Page:
         self._position.value = tuple(np.round(target[:3, 3], 3).tolist())
 
     def _moved_target(self, position: Any) -> Array:
-        target = _pose(self._scene.target.position, self._scene.target.wxyz)
+        target = pose_of(self._scene.target.position, self._scene.target.wxyz)
         moved: Array = np.array(position, dtype=np.float64)
         if moved.shape != (3,) or not np.isfinite(moved).all():
             raise ValueError("the target's position must be three finite numbers")
@@ -461,12 +461,6 @@ class _Replay:
         return self.episode.samples[at] if at < len(self.episode) else None
 
 
-def _pose(position: Any, wxyz: Any) -> Array:
-    from .scene import pose_of
-
-    return pose_of(position, wxyz)
-
-
 def _number(value: Any, least: float, most: float) -> float:
     number = float(value)
     if not least <= number <= most:
@@ -477,7 +471,5 @@ def _number(value: Any, least: float, most: float) -> float:
 @contextlib.contextmanager
 def _quiet() -> Any:
     """Without the library's own banner."""
-    import io
-
     with contextlib.redirect_stdout(io.StringIO()):
         yield
