@@ -38,7 +38,8 @@ void cart_law_waves(benchmark::State& state) {
   PlanarPath path(kSamples, 2);
   for (int i = 0; i < kSamples; ++i) {
     const double s = static_cast<double>(i) / (kSamples - 1);
-    path.row(i) << 0.5 * std::sin(2.0 + 9.0 * s), 0.6 * std::cos(3.14159265358979 * static_cast<double>(state.range(0)) * s);
+    path.row(i) << 0.5 * std::sin(2.0 + 9.0 * s),
+        0.6 * std::cos(3.14159265358979 * static_cast<double>(state.range(0)) * s);
   }
   int strings = 0;
   for (auto _ : state) strings = cart_law(path, 0.0, 0.2, 0.2).strings;

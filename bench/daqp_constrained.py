@@ -1,4 +1,5 @@
-"""The constrained problem of qp_problem.hpp by DAQP, timed by its own clock: min |J_ω q̇ − ω|² + ε|q̇|², J_v q̇ = v, |q̇_i| ≤ limit."""
+"""The constrained problem of qp_problem.hpp by DAQP, timed by its own clock: min |J_ω q̇ − ω|² + ε|q̇|², J_v q̇ = v,
+|q̇_i| ≤ limit."""
 
 from __future__ import annotations
 
@@ -8,6 +9,7 @@ import sys
 
 import daqp
 import numpy as np
+
 import sigmaik as sk
 
 TWIST = np.array([0.1, -0.05, 0.2, 0.1, 0.3, -0.2])

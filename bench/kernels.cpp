@@ -1,8 +1,8 @@
 // Every kernel beside its peers, in one binary: ratios of one run mean something on a noisy machine.
 #include <vector>
 
-#include <Eigen/SVD>
 #include <benchmark/benchmark.h>
+#include <Eigen/SVD>
 #include <kdl/chainfksolverpos_recursive.hpp>
 #include <kdl/chainiksolvervel_pinv.hpp>
 #include <kdl/chainiksolvervel_pinv_givens.hpp>
@@ -16,10 +16,10 @@
 
 namespace {
 
+using bench::JointVector;
 using bench::kPath;
 using bench::Scene;
 using bench::scene;
-using bench::JointVector;
 
 // Kinematics ---------------------------------------------------------------------------------------------------------
 
@@ -266,7 +266,8 @@ void constrained_ik(benchmark::State& state) {
   ik.reset(home);
   const sigmaik::Pose start = ik.tip();
   std::vector<sigmaik::Pose> path(kPath, start);
-  for (int k = 0; k < kPath; ++k) path[static_cast<std::size_t>(k)].translation()[1] += 0.1 * std::sin(2.0 * M_PI * k / kPath);
+  for (int k = 0; k < kPath; ++k)
+    path[static_cast<std::size_t>(k)].translation()[1] += 0.1 * std::sin(2.0 * M_PI * k / kPath);
   int i = 0, held = 0, optimised = 0;
   for (auto _ : state) {
     const sigmaik::ConstrainedIkStep step = ik.step(path[static_cast<std::size_t>(i++ & (kPath - 1))]);
@@ -281,4 +282,3 @@ BENCHMARK(constrained_ik<false>)->Name("constrained_ik_step");
 BENCHMARK(constrained_ik<true>)->Name("constrained_ik_step_switching");
 
 }  // namespace
-

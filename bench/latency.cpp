@@ -131,8 +131,7 @@ int main(int argc, char** argv) {
       if (cores < 2 && std::string(other) != "idle") continue;
       const Neighbour neighbour(other, 0);
       std::this_thread::sleep_for(std::chrono::milliseconds(100));
-      std::vector<double> ns =
-          std::string(rate) == "1 kHz" ? at_1_khz(3000 * scale) : flat_out(1'000'000 * scale);
+      std::vector<double> ns = std::string(rate) == "1 kHz" ? at_1_khz(3000 * scale) : flat_out(1'000'000 * scale);
       const auto bins = histogram(ns);
       std::sort(ns.begin(), ns.end());
       const double p50 = percentile(ns, 0.5), p99 = percentile(ns, 0.99), p999 = percentile(ns, 0.999);

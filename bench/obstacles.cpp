@@ -17,8 +17,7 @@ constexpr int kPoints = 1024;
 // A table and a ball before an iiwa, and configurations all over its range.
 struct Cell {
   Chain arm = Chain::from_urdf(std::string(SIGMAIK_ROBOTS_DIR) + "/kuka_lbr_iiwa_14_r820.urdf", "", "flange");
-  ArmSpheres spheres =
-      ArmSpheres::from_urdf(arm, std::string(SIGMAIK_ROBOTS_DIR) + "/kuka_lbr_iiwa_14_r820.urdf");
+  ArmSpheres spheres = ArmSpheres::from_urdf(arm, std::string(SIGMAIK_ROBOTS_DIR) + "/kuka_lbr_iiwa_14_r820.urdf");
   DistanceField field;
   std::vector<JointVector> q;
 
@@ -40,7 +39,8 @@ struct Cell {
         for (int z = 0; z < kNodes; ++z) {
           const Eigen::Vector3d p = origin + kCell * Eigen::Vector3d(x, y, z);
           const double ball = (p - Eigen::Vector3d(-0.4, 0.3, 0.8)).norm() - 0.15;
-          const Eigen::Array3d beside = (p - Eigen::Vector3d(0.6, 0.0, 0.4)).array().abs() - Eigen::Array3d(0.3, 0.5, 0.02);
+          const Eigen::Array3d beside = (p - Eigen::Vector3d(0.6, 0.0, 0.4)).array().abs() -
+                                        Eigen::Array3d(0.3, 0.5, 0.02);
           const double table = beside.max(0.0).matrix().norm() + std::min(beside.maxCoeff(), 0.0);
           distances.push_back(std::min(ball, table));
         }

@@ -49,9 +49,7 @@ def pinocchio_jparse() -> Callable[[int], object]:
         J = pin.getFrameJacobian(model, data, frame, pin.LOCAL_WORLD_ALIGNED)
         tip = data.oMf[frame]
         error = np.r_[targets[i].translation - tip.translation, pin.log3(targets[i].rotation @ tip.rotation.T)]
-        inverse, nullspace = jparse.compute(
-            J, position_dimensions=3, angular_dimensions=3, return_nullspace=True
-        )
+        inverse, nullspace = jparse.compute(J, position_dimensions=3, angular_dimensions=3, return_nullspace=True)
         return inverse @ (GAIN * error) + nullspace @ (HOME - q)
 
     return cycle

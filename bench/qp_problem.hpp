@@ -1,6 +1,7 @@
 #pragma once
-// The problems of an arm's cycle as QP solvers see them. `Velocity`: min |J q̇ − ẋ|² + ε|q̇|², |q̇_i| ≤ limit. `Constrained`: the
-// linear velocity exactly, the angular one as well as the box allows, which is tight enough to matter in most cycles.
+// The problems of an arm's cycle as QP solvers see them. `Velocity`: min |J q̇ − ẋ|² + ε|q̇|², |q̇_i| ≤ limit.
+// `Constrained`: the linear velocity exactly, the angular one as well as the box allows, which is tight enough to
+// matter in most cycles.
 
 #include "scene.hpp"
 

@@ -80,9 +80,7 @@ def instructions(directory: pathlib.Path) -> float | None:
         stdout=subprocess.DEVNULL,
         check=True,
     )
-    subprocess.run(
-        ["cmake", "--build", directory, "--target", "sigmaik_cycles"], stdout=subprocess.DEVNULL, check=True
-    )
+    subprocess.run(["cmake", "--build", directory, "--target", "sigmaik_cycles"], stdout=subprocess.DEVNULL, check=True)
 
     def count(cycles: int) -> int:
         run = subprocess.run(
@@ -148,7 +146,14 @@ def main() -> int:
     subprocess.run([sys.executable, ROOT / "bench" / "peers.py", "--json", out / "peers.json"], check=True)
     peers = result["peers"] = json.loads((out / "peers.json").read_text())
     print("\ntime-optimal motions", flush=True)
-    command = [sys.executable, ROOT / "bench" / "time_optimal.py", "--pairs", "100", "--json", out / "time_optimal.json"]
+    command = [
+        sys.executable,
+        ROOT / "bench" / "time_optimal.py",
+        "--pairs",
+        "100",
+        "--json",
+        out / "time_optimal.json",
+    ]
     subprocess.run(command, check=True)
     result["time_optimal"] = json.loads((out / "time_optimal.json").read_text())
     result["instructions"] = instructions(ROOT / "build" / "callgrind")
@@ -205,7 +210,13 @@ def main() -> int:
     for name in ("velocity_eiquadprog", "velocity_proxsuite", "constrained_eiquadprog", "constrained_proxsuite"):
         if name in ns:
             print(f"{name + ', for comparison':62} {cpu(name):7.0f} ns")
-    for name in ("servo_redistribute", "servo_scale", "constrained_ik_step_switching", "analytic_ik_solve", "analytic_ik_nearest"):
+    for name in (
+        "servo_redistribute",
+        "servo_scale",
+        "constrained_ik_step_switching",
+        "analytic_ik_solve",
+        "analytic_ik_nearest",
+    ):
         print(f"{name:62} {cpu(name):7.0f} ns")
     run = subprocess.run([sys.executable, ROOT / "bench" / "daqp_constrained.py"], capture_output=True, text=True)
     if run.returncode == 0:

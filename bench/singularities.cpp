@@ -1,9 +1,10 @@
-// Potentials around known singular sets beside manipulability, in closed form and from the Jacobian; each with its gradient.
+// Potentials around known singular sets beside manipulability, in closed form and from the Jacobian; each with its
+// gradient.
 #include <string>
 #include <vector>
 
-#include <Eigen/Cholesky>
 #include <benchmark/benchmark.h>
+#include <Eigen/Cholesky>
 
 #include <sigmaik/indices.hpp>
 #include <sigmaik/singularities.hpp>
@@ -57,7 +58,8 @@ void run(benchmark::State& state, Function function) {
 }
 
 void potential_gradient(benchmark::State& state) {
-  run(state, [](const Arm& a, const JointVector& q, JointVector& gradient) { return a.sets.potential(q, {}, gradient); });
+  run(state,
+      [](const Arm& a, const JointVector& q, JointVector& gradient) { return a.sets.potential(q, {}, gradient); });
 }
 BENCHMARK(potential_gradient)->DenseRange(0, 2);
 
@@ -70,14 +72,16 @@ void potential_hessian(benchmark::State& state) {
 BENCHMARK(potential_hessian)->DenseRange(0, 2);
 
 void manipulability_closed_form_gradient(benchmark::State& state) {
-  run(state, [](const Arm& a, const JointVector& q, JointVector& gradient) { return a.sets.manipulability(q, gradient); });
+  run(state,
+      [](const Arm& a, const JointVector& q, JointVector& gradient) { return a.sets.manipulability(q, gradient); });
 }
 BENCHMARK(manipulability_closed_form_gradient)->DenseRange(0, 2);
 
 // From the singular values: right down to zero.
 void manipulability_svd_gradient(benchmark::State& state) {
   const sigmaik::IndexFunction index(sigmaik::Index::Manipulability);
-  run(state, [&](const Arm& a, const JointVector& q, JointVector& gradient) { return index.value(a.chain, q, gradient); });
+  run(state,
+      [&](const Arm& a, const JointVector& q, JointVector& gradient) { return index.value(a.chain, q, gradient); });
 }
 BENCHMARK(manipulability_svd_gradient)->DenseRange(0, 2);
 

@@ -2,9 +2,10 @@
 
     .venv/bin/python bench/time_optimal.py --pairs 200
 
-Both solve the problem of Beck et al. (2022) as printed, limits of position at the nodes alone, with time weight 600. IPOPT
-runs as CasADi calls it, with exact Hessians from compact expressions, tolerance 1e-8, from the straight line at an even
-speed; ours looks again on the other sides where the first start still leads through a potential, and that counts in its time.
+Both solve the problem of Beck et al. (2022) as printed, limits of position at the nodes alone, with time weight 600.
+IPOPT runs as CasADi calls it, with exact Hessians from compact expressions, tolerance 1e-8, from the straight line at
+an even speed; ours looks again on the other sides where the first start still leads through a potential, and that
+counts in its time.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import pathlib
 from typing import Any
 
 import numpy as np
+
 import sigmaik as sk
 from sigmaik.experiments.montecarlo import Study, sample_pair
 from sigmaik.planning.time_optimal import time_optimal
@@ -53,7 +55,14 @@ def compare(robot: str, pairs: int, weight: float, avoid: str | None) -> dict[st
         row = {}
         for solver in ("sigmaik", "ipopt"):
             plan = time_optimal(
-                chain, start, goal, avoid, time_weight=weight, between_nodes=False, restarts=solver == "sigmaik", solver=solver
+                chain,
+                start,
+                goal,
+                avoid,
+                time_weight=weight,
+                between_nodes=False,
+                restarts=solver == "sigmaik",
+                solver=solver,
             )
             solved = plan.status == "optimal"
             broken = violation(chain, plan, start, goal) if plan.status != "failed" else np.nan

@@ -133,8 +133,8 @@ std::array<bool, 6> rows_argument(py::handle rows, const char* what) {
   for (py::ssize_t i = 0; i < 6; ++i) {
     const double entry = array.data()[i];
     if (entry != 0.0 && entry != 1.0) {
-      throw Error(std::string(what) + "[" + std::to_string(i) + "] = " + py::str(py::float_(entry)).cast<std::string>() +
-                  " must be 0 or 1");
+      throw Error(std::string(what) + "[" + std::to_string(i) +
+                  "] = " + py::str(py::float_(entry)).cast<std::string>() + " must be 0 or 1");
     }
     out[static_cast<std::size_t>(i)] = entry == 1.0;
   }
@@ -146,7 +146,8 @@ Batch batch_argument(py::handle object, int n) {
   const py::array any = py::array::ensure(object);
   if (!any) PyErr_Clear();
   const bool many = any && any.ndim() == 2;
-  return {many ? array_argument(any, "q", {-1, n}, need.c_str()) : array_argument(object, "q", {n}, need.c_str()), many};
+  return {many ? array_argument(any, "q", {-1, n}, need.c_str()) : array_argument(object, "q", {n}, need.c_str()),
+          many};
 }
 
 Task task_argument(py::handle mask, const std::string& frame) {

@@ -85,16 +85,15 @@ py::array_t<double> to_numpy(const Eigen::MatrixBase<Derived>& values) {
     return out;
   } else {
     py::array_t<double> out({values.rows(), values.cols()});
-    Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(out.mutable_data(), values.rows(),
-                                                                                      values.cols()) = values;
+    Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(
+        out.mutable_data(), values.rows(), values.cols()) = values;
     return out;
   }
 }
 
 /// Calls fill(q, out) for q (n,), or for every row of q (B, n) without the GIL; `shape` is that of one result.
 template <typename Fill>
-py::array_t<double> map_configurations(int n, const py::object& object, std::vector<py::ssize_t> shape,
-                                       Fill fill) {
+py::array_t<double> map_configurations(int n, const py::object& object, std::vector<py::ssize_t> shape, Fill fill) {
   const Batch batch = batch_argument(object, n);
   const py::ssize_t count = batch.count();
   py::ssize_t size = 1;

@@ -29,7 +29,8 @@ AnalyticSolutions solutions(const AnalyticIk& ik, const py::object& pose, bool w
 
 void bind_analytic_ik(py::module_& m) {
   py::class_<AnalyticBranch>(m, "AnalyticBranch", "One posture of a pose, from AnalyticIk.branches().")
-      .def_property_readonly("q", [](const AnalyticBranch& b) { return to_numpy(b.q); }, "(6,) [rad]")
+      .def_property_readonly(
+          "q", [](const AnalyticBranch& b) { return to_numpy(b.q); }, "(6,) [rad]")
       .def_readonly("within_limits", &AnalyticBranch::within_limits, "Every joint is within the chain's limits.")
       .def_property_readonly(
           "singular", [](const AnalyticBranch& b) { return singular_names(b.singular); },
@@ -97,9 +98,8 @@ void bind_analytic_ik(py::module_& m) {
           "Those of 'shoulder', 'elbow', 'wrist' that any posture of `pose` (4, 4) is singular by; branches() tells\n"
           "which posture.")
       .def_property_readonly("chain", &AnalyticIk::chain, "The arm.")
-      .def("__repr__", [](const AnalyticIk& ik) {
-        return "AnalyticIk('" + ik.chain().base() + "' → '" + ik.chain().tip() + "')";
-      });
+      .def("__repr__",
+           [](const AnalyticIk& ik) { return "AnalyticIk('" + ik.chain().base() + "' → '" + ik.chain().tip() + "')"; });
 }
 
 }  // namespace sigmaik::bindings

@@ -54,18 +54,21 @@ void bind_cart(py::module_& m) {
     }
   });
 
-  py::class_<CartRegion>(m, "CartRegion", "A connected part of the forbidden region, in the plane of time and cart position.")
+  py::class_<CartRegion>(m, "CartRegion",
+                         "A connected part of the forbidden region, in the plane of time and cart position.")
       .def_readonly("first", &CartRegion::first, "[samples] where it begins: its tip, between samples.")
       .def_readonly("last", &CartRegion::last, "[samples] where it ends.")
       .def_readonly("side", &CartRegion::side, "1: the law passes above λ+; −1: below λ−.");
 
   py::class_<CartLaw>(m, "CartLaw", "Answer of cart_law().")
-      .def_property_readonly("x", [](const CartLaw& c) { return to_numpy(c.x); }, "(M,) [m]")
-      .def_property_readonly("lower", [](const CartLaw& c) { return to_numpy(c.lower); },
-                             "(M,) [m] λ−, ∞ where nothing is forbidden.")
-      .def_property_readonly("upper", [](const CartLaw& c) { return to_numpy(c.upper); },
-                             "(M,) [m] λ+, −∞ where nothing is forbidden.")
-      .def_property_readonly("multipliers", [](const CartLaw& c) { return to_numpy(c.multipliers); }, "(M,) [m] μ.")
+      .def_property_readonly(
+          "x", [](const CartLaw& c) { return to_numpy(c.x); }, "(M,) [m]")
+      .def_property_readonly(
+          "lower", [](const CartLaw& c) { return to_numpy(c.lower); }, "(M,) [m] λ−, ∞ where nothing is forbidden.")
+      .def_property_readonly(
+          "upper", [](const CartLaw& c) { return to_numpy(c.upper); }, "(M,) [m] λ+, −∞ where nothing is forbidden.")
+      .def_property_readonly(
+          "multipliers", [](const CartLaw& c) { return to_numpy(c.multipliers); }, "(M,) [m] μ.")
       .def_readonly("regions", &CartLaw::regions, "Connected parts of the forbidden region.")
       .def_readonly("corners", &CartLaw::corners, "[samples] where the string bends, and its ends.")
       .def_readonly("corner_x", &CartLaw::corner_x, "[m] there.")
@@ -84,10 +87,13 @@ void bind_cart(py::module_& m) {
       },
       py::arg("flange_xy"), py::arg("start"), py::arg("end"), py::arg("radius"), py::kw_only(), py::arg("lower"),
       py::arg("upper"), py::arg("margin"), py::arg("turn"), py::arg("duration"), py::arg("max_speed"),
-      py::arg("max_acceleration"), py::arg("at_rest"), "The cart's law of the least energy. `sigmaik.planning.cart_motion` is what to call.");
+      py::arg("max_acceleration"), py::arg("at_rest"),
+      "The cart's law of the least energy. `sigmaik.planning.cart_motion` is what to call.");
   py::class_<PlaneCartLaw>(m, "PlaneCartLaw", "Answer of plane_cart_law().")
-      .def_property_readonly("c", [](const PlaneCartLaw& law) { return to_numpy(law.c); }, "(M, 2) [m]")
-      .def_property_readonly("push", [](const PlaneCartLaw& law) { return to_numpy(law.push); }, "(M,) [m]")
+      .def_property_readonly(
+          "c", [](const PlaneCartLaw& law) { return to_numpy(law.c); }, "(M, 2) [m]")
+      .def_property_readonly(
+          "push", [](const PlaneCartLaw& law) { return to_numpy(law.push); }, "(M,) [m]")
       .def_readonly("energy", &PlaneCartLaw::energy, "[m²] Σ |Δc|².")
       .def_readonly("turn", &PlaneCartLaw::turn, "[rad] of the point's azimuth.")
       .def_readonly("starts", &PlaneCartLaw::starts, "First guesses tried.")
@@ -95,9 +101,9 @@ void bind_cart(py::module_& m) {
 
   m.def(
       "plane_cart_law",
-      [](const ArrayLike& flange_xy, const ArrayLike& start, const ArrayLike& end, double radius, const ArrayLike& lower,
-         const ArrayLike& upper, double margin, double max_radius, std::optional<double> turn, double duration,
-         const ArrayLike& max_speed, const ArrayLike& max_acceleration, bool at_rest) {
+      [](const ArrayLike& flange_xy, const ArrayLike& start, const ArrayLike& end, double radius,
+         const ArrayLike& lower, const ArrayLike& upper, double margin, double max_radius, std::optional<double> turn,
+         double duration, const ArrayLike& max_speed, const ArrayLike& max_acceleration, bool at_rest) {
         const PlanarPath path = path_argument(flange_xy);
         const Eigen::Vector2d from = axes_argument(start, "start"), to = axes_argument(end, "end");
         PlaneCartOptions options;
@@ -114,8 +120,8 @@ void bind_cart(py::module_& m) {
         return planning::plane_cart_law(path, from, to, radius, options);
       },
       py::arg("flange_xy"), py::arg("start"), py::arg("end"), py::arg("radius"), py::kw_only(), py::arg("lower"),
-      py::arg("upper"), py::arg("margin"), py::arg("max_radius"), py::arg("turn"), py::arg("duration"), py::arg("max_speed"),
-      py::arg("max_acceleration"), py::arg("at_rest"),
+      py::arg("upper"), py::arg("margin"), py::arg("max_radius"), py::arg("turn"), py::arg("duration"),
+      py::arg("max_speed"), py::arg("max_acceleration"), py::arg("at_rest"),
       "The motion of a cart with two axes. `sigmaik.planning.cart_motion_plane` is what to call.");
   m.def(
       "forbidden_intervals",
@@ -131,31 +137,30 @@ void bind_cart(py::module_& m) {
          const ArrayLike& upper) -> py::typing::Tuple<py::array_t<double>, py::typing::List<py::int_>> {
         Eigen::VectorXd x;
         std::vector<int> corners;
-        planning::taut_string(bounds_argument(at, "at"), bounds_argument(lower, "lower"), bounds_argument(upper, "upper"), x,
-                              corners);
+        planning::taut_string(bounds_argument(at, "at"), bounds_argument(lower, "lower"),
+                              bounds_argument(upper, "upper"), x, corners);
         return py::make_tuple(to_numpy(x), corners);
       },
       py::arg("at"), py::arg("lower"), py::arg("upper"),
       "The shortest string x (N,) through lower ≤ x ≤ upper over increasing `at`, and the indices of its corners.");
   m.def(
       "cart_descent",
-      [](const ArrayLike& lower, const ArrayLike& upper, const ArrayLike& guess, double alpha, double step, int max_iterations,
-         bool until_admissible) -> py::typing::Tuple<py::array_t<double>, py::int_> {
+      [](const ArrayLike& lower, const ArrayLike& upper, const ArrayLike& guess, double alpha, double step,
+         int max_iterations, bool until_admissible) -> py::typing::Tuple<py::array_t<double>, py::int_> {
         const Eigen::VectorXd low = bounds_argument(lower, "lower"), high = bounds_argument(upper, "upper");
         Eigen::VectorXd x = bounds_argument(guess, "guess");
         int iterations = 0;
         {
           py::gil_scoped_release release;
-          iterations = planning::cart_descent(low, high, x,
-                                              {.alpha = alpha,
-                                               .step = step,
-                                               .max_iterations = max_iterations,
-                                               .until_admissible = until_admissible});
+          iterations = planning::cart_descent(
+              low, high, x,
+              {.alpha = alpha, .step = step, .max_iterations = max_iterations, .until_admissible = until_admissible});
         }
         return py::make_tuple(to_numpy(x), iterations);
       },
-      py::arg("lower"), py::arg("upper"), py::arg("guess"), py::arg("alpha"), py::arg("step"), py::arg("max_iterations"),
-      py::arg("until_admissible"), "Gradient descent (10) from a guess (M,) [m]: the law and the number of iterations.");
+      py::arg("lower"), py::arg("upper"), py::arg("guess"), py::arg("alpha"), py::arg("step"),
+      py::arg("max_iterations"), py::arg("until_admissible"),
+      "Gradient descent (10) from a guess (M,) [m]: the law and the number of iterations.");
 }
 
 }  // namespace sigmaik::bindings

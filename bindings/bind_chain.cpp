@@ -19,8 +19,8 @@ JointVector limit_argument(const MaybeArray& object, const char* what, const Joi
   }
   if (array.ndim() == 0) return JointVector::Constant(otherwise.size(), *array.data());
   if (array.ndim() != 1 || array.size() != otherwise.size()) {
-    throw Error(std::string(what) + " has shape " + shape_text(array) + ", needs (" +
-                std::to_string(otherwise.size()) + ",) or one number");
+    throw Error(std::string(what) + " has shape " + shape_text(array) + ", needs (" + std::to_string(otherwise.size()) +
+                ",) or one number");
   }
   return Eigen::Map<const Eigen::VectorXd>(array.data(), array.size());
 }
@@ -28,22 +28,26 @@ JointVector limit_argument(const MaybeArray& object, const char* what, const Joi
 }  // namespace
 
 void bind_chain(py::module_& m) {
-  py::class_<JointLimits>(m, "JointLimits", "Limits of a chain's movable joints, (n,) each, infinite where there is none.")
-      .def_property_readonly("lower", [](const JointLimits& l) { return to_numpy(l.lower); }, "(n,) [rad or m]")
-      .def_property_readonly("upper", [](const JointLimits& l) { return to_numpy(l.upper); }, "(n,) [rad or m]")
-      .def_property_readonly("velocity", [](const JointLimits& l) { return to_numpy(l.velocity); },
-                             "(n,) [rad/s or m/s]")
-      .def_property_readonly("acceleration", [](const JointLimits& l) { return to_numpy(l.acceleration); },
-                             "(n,) [rad/s² or m/s²]")
-      .def_property_readonly("jerk", [](const JointLimits& l) { return to_numpy(l.jerk); }, "(n,) [rad/s³ or m/s³]")
+  py::class_<JointLimits>(m, "JointLimits",
+                          "Limits of a chain's movable joints, (n,) each, infinite where there is none.")
+      .def_property_readonly(
+          "lower", [](const JointLimits& l) { return to_numpy(l.lower); }, "(n,) [rad or m]")
+      .def_property_readonly(
+          "upper", [](const JointLimits& l) { return to_numpy(l.upper); }, "(n,) [rad or m]")
+      .def_property_readonly(
+          "velocity", [](const JointLimits& l) { return to_numpy(l.velocity); }, "(n,) [rad/s or m/s]")
+      .def_property_readonly(
+          "acceleration", [](const JointLimits& l) { return to_numpy(l.acceleration); }, "(n,) [rad/s² or m/s²]")
+      .def_property_readonly(
+          "jerk", [](const JointLimits& l) { return to_numpy(l.jerk); }, "(n,) [rad/s³ or m/s³]")
       .def_property_readonly("effort", [](const JointLimits& l) { return to_numpy(l.effort); }, "(n,) [N·m or N]");
 
   py::class_<Inertia>(m, "Inertia", "Mass distribution of a link, or of what the tip carries. Immutable.")
       .def(py::init([](double mass, const ArrayLike& center_of_mass, const MaybeArray& tensor) {
              Inertia inertia;
              inertia.mass = mass;
-             inertia.center_of_mass =
-                 Eigen::Map<const Eigen::Vector3d>(array_argument(center_of_mass, "center_of_mass", {3}, "(3,)").data());
+             inertia.center_of_mass = Eigen::Map<const Eigen::Vector3d>(
+                 array_argument(center_of_mass, "center_of_mass", {3}, "(3,)").data());
              if (tensor) {
                const Array array = array_argument(*tensor, "tensor", {3, 3}, "(3, 3)");
                inertia.tensor = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(array.data());
@@ -56,25 +60,29 @@ void bind_chain(py::module_& m) {
            "tensor: (3, 3) [kg·m²], about the centre of mass, in the link's axes; None: a point mass.\n\n"
            "Chains and Dynamics check the values.")
       .def_readonly("mass", &Inertia::mass, "[kg]")
-      .def_property_readonly("center_of_mass", [](const Inertia& i) { return to_numpy(i.center_of_mass); },
-                             "(3,) [m], in the link's frame")
-      .def_property_readonly("tensor", [](const Inertia& i) { return to_numpy(i.tensor); },
-                             "(3, 3) [kg·m²], about the centre of mass, in the link's axes")
-      .def("__repr__", [](const Inertia& i) {
-        return "Inertia(" + py::repr(py::float_(i.mass)).cast<std::string>() + " kg)";
-      });
+      .def_property_readonly(
+          "center_of_mass", [](const Inertia& i) { return to_numpy(i.center_of_mass); },
+          "(3,) [m], in the link's frame")
+      .def_property_readonly(
+          "tensor", [](const Inertia& i) { return to_numpy(i.tensor); },
+          "(3, 3) [kg·m²], about the centre of mass, in the link's axes")
+      .def("__repr__",
+           [](const Inertia& i) { return "Inertia(" + py::repr(py::float_(i.mass)).cast<std::string>() + " kg)"; });
 
-  py::class_<Segment>(m, "Segment",
-                      "A joint, fixed or movable, and the link that it carries. The link's frame is the joint's after the "
-                      "motion: parent ← origin · motion(axis, q).")
+  py::class_<Segment>(
+      m, "Segment",
+      "A joint, fixed or movable, and the link that it carries. The link's frame is the joint's after the "
+      "motion: parent ← origin · motion(axis, q).")
       .def_readonly("joint_name", &Segment::joint_name, "Name of the joint.")
       .def_readonly("link_name", &Segment::link_name, "Name of the link.")
-      .def_property_readonly("type", [](const Segment& s) { return to_string(s.type); },
-                             "'fixed', 'revolute', 'continuous' or 'prismatic'.")
-      .def_property_readonly("origin", [](const Segment& s) { return to_numpy(s.origin.matrix()); },
-                             "(4, 4) the joint's frame in the parent link, at q = 0")
-      .def_property_readonly("axis", [](const Segment& s) { return to_numpy(s.axis); },
-                             "(3,) unit vector in the joint's frame")
+      .def_property_readonly(
+          "type", [](const Segment& s) { return to_string(s.type); },
+          "'fixed', 'revolute', 'continuous' or 'prismatic'.")
+      .def_property_readonly(
+          "origin", [](const Segment& s) { return to_numpy(s.origin.matrix()); },
+          "(4, 4) the joint's frame in the parent link, at q = 0")
+      .def_property_readonly(
+          "axis", [](const Segment& s) { return to_numpy(s.axis); }, "(3,) unit vector in the joint's frame")
       .def_readonly("inertia", &Segment::inertia, "Of the link, None where it is not known.")
       .def("__repr__", [](const Segment& s) {
         return "Segment('" + s.joint_name + "' carries '" + s.link_name + "', " + to_string(s.type) + ")";
@@ -111,8 +119,9 @@ void bind_chain(py::module_& m) {
       .def_property_readonly("dof", &Chain::dof, "Number of movable joints, n.")
       .def_property_readonly("base", &Chain::base, "Name of the base link.")
       .def_property_readonly("tip", &Chain::tip, "Name of the tip link.")
-      .def_property_readonly("joint_names", [](const Chain& c) -> Strings { return py::tuple(py::cast(c.joint_names())); },
-                             "Names of the movable joints, base to tip.")
+      .def_property_readonly(
+          "joint_names", [](const Chain& c) -> Strings { return py::tuple(py::cast(c.joint_names())); },
+          "Names of the movable joints, base to tip.")
       .def_property_readonly(
           "joint_types",
           [](const Chain& c) -> Strings {
@@ -121,11 +130,10 @@ void bind_chain(py::module_& m) {
             return py::tuple(types);
           },
           "'revolute', 'continuous' or 'prismatic' for every movable joint, base to tip.")
-      .def_property_readonly("segments",
-                             [](const Chain& c) -> py::typing::Tuple<Segment, py::ellipsis> {
-                               return py::tuple(py::cast(c.segments()));
-                             },
-                             "Everything between base and tip, fixed joints included.")
+      .def_property_readonly(
+          "segments",
+          [](const Chain& c) -> py::typing::Tuple<Segment, py::ellipsis> { return py::tuple(py::cast(c.segments())); },
+          "Everything between base and tip, fixed joints included.")
       .def_property_readonly("limits", &Chain::limits, "Limits of the movable joints.")
       .def(
           "with_limits",
@@ -138,9 +146,8 @@ void bind_chain(py::module_& m) {
                                   limit_argument(jerk, "jerk", old.jerk),
                                   limit_argument(effort, "effort", old.effort)});
           },
-          py::kw_only(), py::arg("lower") = py::none(), py::arg("upper") = py::none(),
-          py::arg("velocity") = py::none(), py::arg("acceleration") = py::none(), py::arg("jerk") = py::none(),
-          py::arg("effort") = py::none(),
+          py::kw_only(), py::arg("lower") = py::none(), py::arg("upper") = py::none(), py::arg("velocity") = py::none(),
+          py::arg("acceleration") = py::none(), py::arg("jerk") = py::none(), py::arg("effort") = py::none(),
           "The same arm with other limits: (n,) or one number each, infinite for none; None keeps what there is.")
       .def(
           "pose",

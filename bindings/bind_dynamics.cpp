@@ -21,12 +21,15 @@ void bind_dynamics(py::module_& m) {
            py::arg("chain"), py::arg("gravity") = py::none(), py::arg("payload") = py::none(),
            "gravity: (3,) [m/s²] in base axes; by default 9.80665 m/s² along −z.\n"
            "payload: what the tip carries, in the tip's frame.\n\n"
-           "Raises Error where a movable joint carries no link whose inertia is known, and where the payload is no body:\n"
+           "Raises Error where a movable joint carries no link whose inertia is known, and where the payload is no "
+           "body:\n"
            "a mass below 0, a tensor that is not symmetric, a principal moment beyond the sum of the other two.")
       .def_property_readonly("dof", &Dynamics::dof, "Number of movable joints, n.")
       .def(
           "mass_matrix",
-          [](const Dynamics& d, const ArrayLike& q) { return to_numpy(d.mass_matrix(joint_argument(q, "q", d.dof()))); },
+          [](const Dynamics& d, const ArrayLike& q) {
+            return to_numpy(d.mass_matrix(joint_argument(q, "q", d.dof())));
+          },
           py::arg("q"), "M (n, n) [kg·m²] at q (n,).")
       .def(
           "coriolis",
@@ -63,22 +66,25 @@ void bind_dynamics(py::module_& m) {
           "Raises Error where M is not positive definite.");
 
   py::class_<ComputedTorqueStep>(m, "ComputedTorqueStep", "Answer of one cycle of a ComputedTorque.")
-      .def_property_readonly("torque", [](const ComputedTorqueStep& s) { return to_numpy(s.torque); },
-                             "(n,) [N·m or N], within the chain's effort limits")
+      .def_property_readonly(
+          "torque", [](const ComputedTorqueStep& s) { return to_numpy(s.torque); },
+          "(n,) [N·m or N], within the chain's effort limits")
       .def_readonly("status", &ComputedTorqueStep::status, "OK, or LIMITED where an effort limit would be broken.")
       .def_readonly("scale", &ComputedTorqueStep::scale, "In [0, 1], the part of v that effort limits leave.")
-      .def_property_readonly("limiting_joints", [](const ComputedTorqueStep& s) { return indices(s.limiting_joints); },
-                             "Indices of the joints whose torque would break its limit.")
+      .def_property_readonly(
+          "limiting_joints", [](const ComputedTorqueStep& s) { return indices(s.limiting_joints); },
+          "Indices of the joints whose torque would break its limit.")
       .def("__repr__", [](const ComputedTorqueStep& s) {
         return std::string("ComputedTorqueStep(status=") + to_string(s.status) +
                ", torque=" + py::str(to_numpy(s.torque)).cast<std::string>() + ")";
       });
 
   const ComputedTorqueOptions defaults;
-  py::class_<ComputedTorque>(m, "ComputedTorque",
-                             "Computed torque control: τ = M(q) v + C(q, q̇) q̇ + g(q), v = q̈_d + 2ζω ė + ω² e, e = q_d − q.\n\n"
-                             "With the true model every joint's error obeys ë + 2ζω ė + ω² e = 0 by itself (Beck et al. 2022,\n"
-                             "eqs. 18 to 20). Where an effort limit of the chain would be broken, v is scaled down in all joints alike.")
+  py::class_<ComputedTorque>(
+      m, "ComputedTorque",
+      "Computed torque control: τ = M(q) v + C(q, q̇) q̇ + g(q), v = q̈_d + 2ζω ė + ω² e, e = q_d − q.\n\n"
+      "With the true model every joint's error obeys ë + 2ζω ė + ω² e = 0 by itself (Beck et al. 2022,\n"
+      "eqs. 18 to 20). Where an effort limit of the chain would be broken, v is scaled down in all joints alike.")
       .def(py::init([](const Chain& chain, double frequency, double damping_ratio, const MaybeArray& gravity,
                        const std::optional<Inertia>& payload) {
              return ComputedTorque(chain, {frequency, damping_ratio,
@@ -97,10 +103,9 @@ void bind_dynamics(py::module_& m) {
           [](ComputedTorque& c, const ArrayLike& q, const ArrayLike& qdot, const ArrayLike& q_desired,
              const ArrayLike& qdot_desired, const ArrayLike& qddot_desired) {
             const int n = c.dof();
-            const ComputedTorqueStep step =
-                c.update(joint_argument(q, "q", n), joint_argument(qdot, "qdot", n),
-                         joint_argument(q_desired, "q_desired", n), joint_argument(qdot_desired, "qdot_desired", n),
-                         joint_argument(qddot_desired, "qddot_desired", n));
+            const ComputedTorqueStep step = c.update(
+                joint_argument(q, "q", n), joint_argument(qdot, "qdot", n), joint_argument(q_desired, "q_desired", n),
+                joint_argument(qdot_desired, "qdot_desired", n), joint_argument(qddot_desired, "qddot_desired", n));
             if (step.status == Status::BadInput) throw Error("the torque is too large for floating-point numbers");
             return step;
           },

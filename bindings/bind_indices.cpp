@@ -43,7 +43,8 @@ void bind_indices(py::module_& m) {
   m.attr("DEFAULT_SCALE") = kDefaultScale;
   m.def(
       "index_of_jacobian",
-      [](const ArrayLike& jacobian, const std::string& index, const ArrayLike& k, double length_scale) -> NumberOrArray {
+      [](const ArrayLike& jacobian, const std::string& index, const ArrayLike& k,
+         double length_scale) -> NumberOrArray {
         const IndexFunction function = function_argument(index, k, length_scale);
         const auto of = [&function](const TaskJacobian& j) {
           if (function.rows() != 0 && function.rows() != j.rows()) {
@@ -65,8 +66,8 @@ void bind_indices(py::module_& m) {
         {
           py::gil_scoped_release release;
           for (py::ssize_t b = 0; b < count; ++b) {
-            data[b] = function.value(TaskJacobian(
-                Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(
+            data[b] = function.value(
+                TaskJacobian(Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(
                     all.data() + b * rows * cols, rows, cols)));
           }
         }
@@ -85,7 +86,8 @@ void bind_indices(py::module_& m) {
         const py::ssize_t count = batch.count();
         py::array_t<double> value(batch.many ? std::vector<py::ssize_t>{count} : std::vector<py::ssize_t>{});
         const py::ssize_t columns = gradients ? n : 0;
-        py::array_t<double> gradient(batch.many ? std::vector<py::ssize_t>{count, columns} : std::vector<py::ssize_t>{columns});
+        py::array_t<double> gradient(batch.many ? std::vector<py::ssize_t>{count, columns}
+                                                : std::vector<py::ssize_t>{columns});
         double* to = value.mutable_data();
         double* slope = gradients ? gradient.mutable_data() : nullptr;
         {
@@ -97,9 +99,11 @@ void bind_indices(py::module_& m) {
       py::arg("chain"), py::arg("q"), py::arg("index"), py::arg("k") = kDefaultScale, py::arg("length_scale") = 1.0,
       py::arg("threads") = 1, py::arg("gradients") = true,
       "Values () or (B,) and, where asked for, gradients (n,) or (B, n) at q (n,) or (B, n).");
-  m.def("reference_scale", &reference_scale, py::arg("chain"), py::arg("length_scale") = 1.0,
-        "k of a chain: 6 where the largest eigenvalue of JJᵀ over its joint ranges stays below that by a tenth, else 1.1\n"
-        "times that eigenvalue, so that the sphere kI holds every ellipsoid. The same on every machine; takes a few ms.");
+  m.def(
+      "reference_scale", &reference_scale, py::arg("chain"), py::arg("length_scale") = 1.0,
+      "k of a chain: 6 where the largest eigenvalue of JJᵀ over its joint ranges stays below that by a tenth, else "
+      "1.1\n"
+      "times that eigenvalue, so that the sphere kI holds every ellipsoid. The same on every machine; takes a few ms.");
 }
 
 }  // namespace sigmaik::bindings

@@ -16,7 +16,8 @@ void rows_argument(const MaybeArray& matrix, const MaybeArray& right, const char
     throw Error(std::string(matrix_name) + " has shape " + shape_text(m) + "; at most " + std::to_string(most) +
                 " rows and 1 to " + std::to_string(kMaxUnknowns) + " columns");
   }
-  to = Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(m.data(), m.shape(0), n);
+  to = Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(m.data(), m.shape(0),
+                                                                                                n);
   Array r = Array::ensure(*right);
   if (!r) {
     PyErr_Clear();
@@ -68,18 +69,22 @@ LeastSquaresSolution solve(LeastSquares& solver, const MaybeArray& A, const Mayb
 
 void bind_least_squares(py::module_& m) {
   py::class_<LeastSquaresSolution>(m, "LeastSquaresSolution", "Answer of least_squares().")
-      .def_property_readonly("x", [](const LeastSquaresSolution& s) { return to_numpy(s.x); },
-                             "(n,) inside the bounds exactly")
-      .def_property_readonly("status", [](const LeastSquaresSolution& s) { return std::string(to_string(s.status)); },
-                             "'optimal'; 'infeasible': G x ≤ h or C x = d cannot be met, and is met as well as possible;\n"
-                             "'step limit': not converged.")
+      .def_property_readonly(
+          "x", [](const LeastSquaresSolution& s) { return to_numpy(s.x); }, "(n,) inside the bounds exactly")
+      .def_property_readonly(
+          "status", [](const LeastSquaresSolution& s) { return std::string(to_string(s.status)); },
+          "'optimal'; 'infeasible': G x ≤ h or C x = d cannot be met, and is met as well as possible;\n"
+          "'step limit': not converged.")
       .def_readonly("steps", &LeastSquaresSolution::steps, "Factorisations taken.")
-      .def_property_readonly("at_lower", [](const LeastSquaresSolution& s) { return indices(s.at_lower); },
-                             "Indices of the unknowns held at their lower bound.")
-      .def_property_readonly("at_upper", [](const LeastSquaresSolution& s) { return indices(s.at_upper); },
-                             "Indices of the unknowns held at their upper bound.")
-      .def_property_readonly("active", [](const LeastSquaresSolution& s) { return indices(s.active); },
-                             "Indices of the rows of G that hold the answer, or are violated.")
+      .def_property_readonly(
+          "at_lower", [](const LeastSquaresSolution& s) { return indices(s.at_lower); },
+          "Indices of the unknowns held at their lower bound.")
+      .def_property_readonly(
+          "at_upper", [](const LeastSquaresSolution& s) { return indices(s.at_upper); },
+          "Indices of the unknowns held at their upper bound.")
+      .def_property_readonly(
+          "active", [](const LeastSquaresSolution& s) { return indices(s.active); },
+          "Indices of the rows of G that hold the answer, or are violated.")
       .def_readonly("violation", &LeastSquaresSolution::violation, "|max(0, G x − h)|")
       .def_readonly("equality_error", &LeastSquaresSolution::equality_error, "|C x − d|");
 

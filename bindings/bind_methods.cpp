@@ -36,7 +36,8 @@ void finish(py::class_<Rule>& c, Arguments arguments) {
     std::string text = py::type::of(self).attr("__name__").cast<std::string>() + "(";
     bool first = true;
     for (const auto& [key, value] : py::dict(arguments(self.cast<const Rule&>()))) {
-      text += (first ? "" : ", ") + key.template cast<std::string>() + "=" + py::repr(value).template cast<std::string>();
+      text += (first ? "" : ", ") + key.template cast<std::string>() + "=" +
+              py::repr(value).template cast<std::string>();
       first = false;
     }
     return text + ")";
@@ -162,8 +163,10 @@ void bind_methods(py::module_& m) {
           "gain_linear, gain_angular: the paper's K ≥ 0, for the command's linear and angular rows.\n"
           "continuous: the gain is K at σ_i = 0 and goes linearly to 1 at the threshold; False: K throughout, as\n"
           "published, which jumps at the threshold where K ≠ 1.\n"
-          "singular_posture: the posture acts along singular directions, as far as J-PARSE's own inverse does not, by its\n"
-          "I − J⁺J: an arm that was stretched out folds back to the side of its posture. False: it does not, as published.");
+          "singular_posture: the posture acts along singular directions, as far as J-PARSE's own inverse does not, by "
+          "its\n"
+          "I − J⁺J: an arm that was stretched out folds back to the side of its posture. False: it does not, as "
+          "published.");
     c.def_readonly("gamma", &JParse::gamma);
     c.def_readonly("gain_linear", &JParse::gain_linear);
     c.def_readonly("gain_angular", &JParse::gain_angular);
@@ -182,8 +185,7 @@ void bind_methods(py::module_& m) {
   bind_gamma_only<JacobianProjection>(m, "JacobianProjection",
                                       "Ablation of J-PARSE (eq. 62): u_iᵀẋ/σ_i where σ_i > γσ_max, else 0; the posture "
                                       "acts in the directions that are left out.");
-  bind_gamma_only<JacobianSafety>(m, "JacobianSafety",
-                                  "Ablation of J-PARSE (eq. 63): u_iᵀẋ/max(σ_i, γσ_max).");
+  bind_gamma_only<JacobianSafety>(m, "JacobianSafety", "Ablation of J-PARSE (eq. 63): u_iᵀẋ/max(σ_i, γσ_max).");
   bind_gamma_only<JacobianSafetyProjection>(m, "JacobianSafetyProjection",
                                             "Ablation of J-PARSE (eq. 64): like JacobianProjection, but the posture "
                                             "does not act in the directions that are left out.");

@@ -25,14 +25,17 @@ DistanceField field_argument(const ArrayLike& distances, const ArrayLike& origin
   const Array all = array_argument(distances, "distances", {-1, -1, -1}, "(X, Y, Z)");
   DistanceField::Shape shape;
   for (py::ssize_t axis = 0; axis < 3; ++axis) {
-    if (all.shape(axis) > std::numeric_limits<int>::max()) throw Error("distances has shape " + shape_text(all) + ", which is absurd");
+    if (all.shape(axis) > std::numeric_limits<int>::max())
+      throw Error("distances has shape " + shape_text(all) + ", which is absurd");
     shape[static_cast<std::size_t>(axis)] = static_cast<int>(all.shape(axis));
   }
   const Array at = array_argument(origin, "origin", {3}, "(3,)");
-  return DistanceField({all.data(), all.data() + all.size()}, shape, Eigen::Map<const Eigen::Vector3d>(at.data()), cell);
+  return DistanceField({all.data(), all.data() + all.size()}, shape, Eigen::Map<const Eigen::Vector3d>(at.data()),
+                       cell);
 }
 
-// Calls fill(point, out) for a point (3,), or for every row of points (M, 3) without the GIL; `shape` is that of one result.
+// Calls fill(point, out) for a point (3,), or for every row of points (M, 3) without the GIL; `shape` is that of one
+// result.
 template <typename Fill>
 py::array_t<double> map_points(const ArrayLike& points, std::vector<py::ssize_t> shape, Fill fill) {
   py::array any = py::array::ensure(points);
@@ -74,8 +77,8 @@ std::vector<SpherePair> pairs_argument(const MaybeArray& pairs, const ArmSpheres
     const double a = all.data()[i], b = all.data()[i + 1];
     for (const double index : {a, b}) {
       if (index != std::floor(index) || index < 0.0 || index >= spheres.size()) {
-        throw Error("pairs[" + std::to_string(i / 2) + "]: there is no sphere " + py::str(py::float_(index)).cast<std::string>() +
-                    "; the arm has " + std::to_string(spheres.size()));
+        throw Error("pairs[" + std::to_string(i / 2) + "]: there is no sphere " +
+                    py::str(py::float_(index)).cast<std::string>() + "; the arm has " + std::to_string(spheres.size()));
       }
     }
     out.push_back({static_cast<int>(a), static_cast<int>(b)});
@@ -86,19 +89,20 @@ std::vector<SpherePair> pairs_argument(const MaybeArray& pairs, const ArmSpheres
 }  // namespace
 
 void bind_obstacles(py::module_& m) {
-  py::class_<DistanceField>(m, "DistanceField",
-                            "Signed distances [m] to obstacles on a regular grid, interpolated trilinearly: positive in\n"
-                            "free space, negative inside. Outside the grid: continuous, growing, and no more than the\n"
-                            "distance to what lies within.")
+  py::class_<DistanceField>(
+      m, "DistanceField",
+      "Signed distances [m] to obstacles on a regular grid, interpolated trilinearly: positive in\n"
+      "free space, negative inside. Outside the grid: continuous, growing, and no more than the\n"
+      "distance to what lies within.")
       .def(py::init(&field_argument), py::arg("distances"), py::arg("origin"), py::arg("cell"),
-           "distances (X, Y, Z) [m] at the nodes, the first of which is at `origin` (3,) [m] in the axes of the arm's base;\n"
+           "distances (X, Y, Z) [m] at the nodes, the first of which is at `origin` (3,) [m] in the axes of the arm's "
+           "base;\n"
            "`cell` [m] from node to node.")
       .def_property_readonly(
-          "shape",
-          [](const DistanceField& f) { return std::tuple{f.shape()[0], f.shape()[1], f.shape()[2]}; },
+          "shape", [](const DistanceField& f) { return std::tuple{f.shape()[0], f.shape()[1], f.shape()[2]}; },
           "Nodes along each axis.")
-      .def_property_readonly("origin", [](const DistanceField& f) { return to_numpy(f.origin()); },
-                             "(3,) [m] of the first node.")
+      .def_property_readonly(
+          "origin", [](const DistanceField& f) { return to_numpy(f.origin()); }, "(3,) [m] of the first node.")
       .def_property_readonly("cell", &DistanceField::cell, "[m]")
       .def(
           "distance",
@@ -119,17 +123,20 @@ void bind_obstacles(py::module_& m) {
           py::arg("points"), "Gradient (3,) of the distance at a point (3,), or (M, 3) at points (M, 3).")
       .def("__repr__", [](const DistanceField& f) {
         return "DistanceField(" + std::to_string(f.shape()[0]) + "×" + std::to_string(f.shape()[1]) + "×" +
-               std::to_string(f.shape()[2]) + " nodes, cell " + py::str(py::float_(f.cell())).cast<std::string>() + " m)";
+               std::to_string(f.shape()[2]) + " nodes, cell " + py::str(py::float_(f.cell())).cast<std::string>() +
+               " m)";
       });
 
-  py::class_<ArmSpheres>(m, "ArmSpheres",
-                         "An arm as S spheres fixed to its links, in the order in which joints move them, base to tip.\n\n"
-                         "`sigmaik.planning.arm_spheres` makes them from a URDF, or along the links.")
+  py::class_<ArmSpheres>(
+      m, "ArmSpheres",
+      "An arm as S spheres fixed to its links, in the order in which joints move them, base to tip.\n\n"
+      "`sigmaik.planning.arm_spheres` makes them from a URDF, or along the links.")
       .def(py::init([](const Chain& chain, const std::vector<std::string>& links, const ArrayLike& centers,
                        const ArrayLike& radii) {
              const auto count = static_cast<py::ssize_t>(links.size());
              const std::string length = std::to_string(count);
-             const Array c = array_argument(centers, "centers", {count, 3}, ("(" + length + ", 3), one a link").c_str());
+             const Array c = array_argument(centers, "centers", {count, 3},
+                                            ("(" + length + ", 3), one a link").c_str());
              const Array r = array_argument(radii, "radii", {count}, ("(" + length + ",), one a link").c_str());
              std::vector<LinkSphere> spheres;
              for (py::ssize_t i = 0; i < count; ++i) {
@@ -221,24 +228,30 @@ void bind_obstacles(py::module_& m) {
       [](const ArmSpheres& spheres, double clearance, double most_contacts) {
         const std::vector<SpherePair> pairs = planning::self_collision_pairs(spheres, clearance, most_contacts);
         py::array_t<int> out({static_cast<py::ssize_t>(pairs.size()), py::ssize_t{2}});
-        for (std::size_t i = 0; i < pairs.size(); ++i) std::copy(pairs[i].begin(), pairs[i].end(), out.mutable_data() + 2 * i);
+        for (std::size_t i = 0; i < pairs.size(); ++i)
+          std::copy(pairs[i].begin(), pairs[i].end(), out.mutable_data() + 2 * i);
         return out;
       },
       py::arg("spheres"), py::arg("clearance") = 0.02, py::arg("most_contacts") = 0.1,
-      "(P, 2) spheres of links that are not neighbours, but for those nearer than `clearance` [m] at more than a share\n"
-      "`most_contacts` (0 … 1) of a thousand configurations within the joint limits. The same on every machine; takes some\n"
+      "(P, 2) spheres of links that are not neighbours, but for those nearer than `clearance` [m] at more than a "
+      "share\n"
+      "`most_contacts` (0 … 1) of a thousand configurations within the joint limits. The same on every machine; takes "
+      "some\n"
       "ms.");
   m.def(
       "self_collision_cost",
       [](const ArmSpheres& spheres, const MaybeArray& pairs, double clearance, double weight) {
-        return bound(planning::self_collision_cost(spheres, pairs_argument(pairs, spheres, clearance), clearance, weight));
+        return bound(
+            planning::self_collision_cost(spheres, pairs_argument(pairs, spheres, clearance), clearance, weight));
       },
       py::arg("spheres"), py::arg("pairs") = py::none(), py::arg("clearance") = 0.02, py::arg("weight") = 1.0,
       "weight · Σ c(d) over pairs of spheres (P, 2), by default `self_collision_pairs(spheres, clearance)`;\n"
       "d the distance of their surfaces, c(d) as in `collision_cost`.");
   m.def(
       "joint_limit_cost",
-      [](const Chain& chain, double margin, double weight) { return bound(planning::joint_limit_cost(chain, margin, weight)); },
+      [](const Chain& chain, double margin, double weight) {
+        return bound(planning::joint_limit_cost(chain, margin, weight));
+      },
       py::arg("chain"), py::arg("margin") = 0.1, py::arg("weight") = 1.0,
       "weight · Σ ½x², x the way by which a joint is nearer to a limit than `margin` [rad or m], or beyond it.");
   m.def(
@@ -250,7 +263,8 @@ void bind_obstacles(py::module_& m) {
         double* const data = out.mutable_data();
         {
           py::gil_scoped_release release;
-          planning::min_distance(spheres, field, static_cast<std::size_t>(batch.count()), batch.q.data(), data, threads);
+          planning::min_distance(spheres, field, static_cast<std::size_t>(batch.count()), batch.q.data(), data,
+                                 threads);
         }
         return number_or_array(out);
       },

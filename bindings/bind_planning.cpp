@@ -43,12 +43,12 @@ void bind_planning(py::module_& m) {
                                                     "A smooth cost of joint positions, with its derivatives.")
       .def_property_readonly("dof", &JointCost::dof, "Number of joints, n.")
       .def(
-          "value",
-          [](const JointCost& c, const ArrayLike& q) { return c.value(joint_argument(q, "q", c.dof())); },
+          "value", [](const JointCost& c, const ArrayLike& q) { return c.value(joint_argument(q, "q", c.dof())); },
           py::arg("q"), "Cost at q (n,).")
       .def(
           "model",
-          [](const JointCost& c, const ArrayLike& q) -> py::typing::Tuple<py::float_, py::array_t<double>, py::array_t<double>> {
+          [](const JointCost& c,
+             const ArrayLike& q) -> py::typing::Tuple<py::float_, py::array_t<double>, py::array_t<double>> {
             JointVector gradient(c.dof());
             JointMatrix hessian(c.dof(), c.dof());
             const double value = c.model(joint_argument(q, "q", c.dof()), gradient, hessian);
@@ -120,10 +120,7 @@ void bind_planning(py::module_& m) {
       .def_readonly("distance", &SupportStates::distance, "‖q − μ‖² in the inverse of the prior's covariance.")
       .def_readonly("iterations", &SupportStates::iterations)
       .def_readonly("converged", &SupportStates::converged, "Whether it stopped by its own rule.")
-      .def(
-          "states",
-          [](const SupportStates& s, int n) { return nodes(s.q, n); },
-          py::arg("dof"), "q (states, n).");
+      .def("states", [](const SupportStates& s, int n) { return nodes(s.q, n); }, py::arg("dof"), "q (states, n).");
   py::class_<SupportPlanner>(m, "SupportPlanner",
                              "Motions as support states under a Gaussian-process prior (Petrović et al.).\n"
                              "`sigmaik.planning.stochastic` and `gradient` are what to call.")
@@ -149,12 +146,14 @@ void bind_planning(py::module_& m) {
       .def(
           "stochastic",
           [](SupportPlanner& p, const ArrayLike& start, const ArrayLike& goal, int samples, int max_iterations,
-             double deviation, double decay, double temperature, double prior_weight, double tolerance, std::uint64_t seed) {
+             double deviation, double decay, double temperature, double prior_weight, double tolerance,
+             std::uint64_t seed) {
             const int n = p.chain().dof();
             const JointVector from = joint_argument(start, "start", n), to = joint_argument(goal, "goal", n);
             py::gil_scoped_release release;
-            return p.stochastic(from, to, {p.states(), samples, max_iterations, deviation, decay, temperature, prior_weight,
-                                           tolerance, seed});
+            return p.stochastic(
+                from, to,
+                {p.states(), samples, max_iterations, deviation, decay, temperature, prior_weight, tolerance, seed});
           },
           py::arg("start"), py::arg("goal"), py::kw_only(), py::arg("samples"), py::arg("max_iterations"),
           py::arg("deviation"), py::arg("decay"), py::arg("temperature"), py::arg("prior_weight"), py::arg("tolerance"),
@@ -171,8 +170,9 @@ void bind_planning(py::module_& m) {
           "A motion from the prior about the straight line: a first guess.");
 
   py::class_<TimeOptimalResult>(m, "TimeOptimalResult", "Answer of TimeOptimal.solve().")
-      .def_property_readonly("status", [](const TimeOptimalResult& r) { return std::string(to_string(r.status)); },
-                             "'optimal', 'feasible' (within all constraints, but there is something to gain) or 'failed'.")
+      .def_property_readonly(
+          "status", [](const TimeOptimalResult& r) { return std::string(to_string(r.status)); },
+          "'optimal', 'feasible' (within all constraints, but there is something to gain) or 'failed'.")
       .def_readonly("duration", &TimeOptimalResult::duration, "[s] t_F = N h.")
       .def_readonly("cost", &TimeOptimalResult::cost, "The objective.")
       .def_readonly("gap", &TimeOptimalResult::gap, "Estimate of what is left to gain.")
@@ -180,19 +180,22 @@ void bind_planning(py::module_& m) {
       .def_readonly("starts", &TimeOptimalResult::starts, "First guesses tried.")
       .def(
           "nodes",
-          [](const TimeOptimalResult& r, int n) -> py::typing::Tuple<py::array_t<double>, py::array_t<double>, py::array_t<double>> {
+          [](const TimeOptimalResult& r,
+             int n) -> py::typing::Tuple<py::array_t<double>, py::array_t<double>, py::array_t<double>> {
             return py::make_tuple(nodes(r.q, n), nodes(r.qdot, n), nodes(r.qddot, n));
           },
           py::arg("dof"), "q, q̇, q̈ (N, n), or (0, n) where failed.");
 
-  py::class_<TimeOptimal>(m, "TimeOptimal",
-                          "Time-optimal motions of one arm with one cost, after Beck et al. (2022), by an interior-point\n"
-                          "method made for double integrators. `sigmaik.planning.time_optimal` is what to call.")
-      .def(py::init([](const Chain& chain, const std::optional<std::shared_ptr<JointCost>>& cost, int node_count, double time_weight,
-                       double effort_weight, double tolerance, int max_iterations, bool between_nodes, bool restarts) {
-             return TimeOptimal(chain, cost.value_or(nullptr),
-                                {node_count, time_weight, effort_weight, tolerance, max_iterations, between_nodes,
-                                 restarts});
+  py::class_<TimeOptimal>(
+      m, "TimeOptimal",
+      "Time-optimal motions of one arm with one cost, after Beck et al. (2022), by an interior-point\n"
+      "method made for double integrators. `sigmaik.planning.time_optimal` is what to call.")
+      .def(py::init([](const Chain& chain, const std::optional<std::shared_ptr<JointCost>>& cost, int node_count,
+                       double time_weight, double effort_weight, double tolerance, int max_iterations,
+                       bool between_nodes, bool restarts) {
+             return TimeOptimal(
+                 chain, cost.value_or(nullptr),
+                 {node_count, time_weight, effort_weight, tolerance, max_iterations, between_nodes, restarts});
            }),
            py::arg("chain"), py::arg("cost"), py::kw_only(), py::arg("nodes") = TimeOptimalOptions{}.nodes,
            py::arg("time_weight") = TimeOptimalOptions{}.time_weight,
@@ -200,8 +203,7 @@ void bind_planning(py::module_& m) {
            py::arg("tolerance") = TimeOptimalOptions{}.tolerance,
            py::arg("max_iterations") = TimeOptimalOptions{}.max_iterations,
            py::arg("between_nodes") = TimeOptimalOptions{}.between_nodes,
-           py::arg("restarts") = TimeOptimalOptions{}.restarts,
-           "Raises Error where an option is out of its range.")
+           py::arg("restarts") = TimeOptimalOptions{}.restarts, "Raises Error where an option is out of its range.")
       .def(
           "solve",
           [](TimeOptimal& t, const ArrayLike& start, const ArrayLike& goal, const MaybeArray& start_velocity,

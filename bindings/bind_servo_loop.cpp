@@ -121,10 +121,11 @@ void bind_servo_loop(py::module_& m) {
       .def_readonly("elapsed", &LoopStatistics::elapsed, "[s] since start(), or from start() to stop().")
       .def_property_readonly("rate", &LoopStatistics::rate, "[Hz] cycles a second.");
 
-  py::class_<ServoLoop>(m, "ServoLoop",
-                        "A servo in a thread of its own, at its own rate, whatever Python does meanwhile.\n\n"
-                        "Commands hold until they are stale: an arm whose commander hangs, or is gone, stops by itself, within its\n"
-                        "limits. Late cycles are counted and left out, never made up for by a burst.")
+  py::class_<ServoLoop>(
+      m, "ServoLoop",
+      "A servo in a thread of its own, at its own rate, whatever Python does meanwhile.\n\n"
+      "Commands hold until they are stale: an arm whose commander hangs, or is gone, stops by itself, within its\n"
+      "limits. Late cycles are counted and left out, never made up for by a burst.")
       .def(py::init([](const Servo& servo, int history, int priority) {
              return std::make_unique<ServoLoop>(servo, ServoLoop::Sink{}, ServoLoopOptions{history, priority});
            }),
@@ -133,16 +134,23 @@ void bind_servo_loop(py::module_& m) {
            "servo: has started (reset); it is copied.\n"
            "history: samples kept for read(), a power of 2.\n"
            "priority: of SCHED_FIFO, 1 to 99; 0 is the ordinary scheduler.")
-      .def("start", &ServoLoop::start, "Starts the thread. Raises Error where it runs already, or the system refuses the priority.")
+      .def("start", &ServoLoop::start,
+           "Starts the thread. Raises Error where it runs already, or the system refuses the priority.")
       .def("stop", &ServoLoop::stop, py::call_guard<py::gil_scoped_release>(),
            "Brings the arm to rest, in a second at most, and ends the thread.")
       .def_property_readonly("running", &ServoLoop::running)
       .def(
-          "follow", [](ServoLoop& loop, const py::object& target, double timeout) { loop.follow(pose_argument(target, "target"), timeout); },
-          py::arg("target"), py::arg("timeout"), "Follows a pose (4, 4) of the tip in the base, for `timeout` [s] unless it is said again.")
+          "follow",
+          [](ServoLoop& loop, const py::object& target, double timeout) {
+            loop.follow(pose_argument(target, "target"), timeout);
+          },
+          py::arg("target"), py::arg("timeout"),
+          "Follows a pose (4, 4) of the tip in the base, for `timeout` [s] unless it is said again.")
       .def(
           "follow_twist",
-          [](ServoLoop& loop, const ArrayLike& twist, double timeout) { loop.follow_twist(twist_argument(twist, "twist"), timeout); },
+          [](ServoLoop& loop, const ArrayLike& twist, double timeout) {
+            loop.follow_twist(twist_argument(twist, "twist"), timeout);
+          },
           py::arg("twist"), py::arg("timeout"),
           "Follows a twist (6,) [v; ω], base axes, at the tip's origin, for `timeout` [s] unless it is said again.")
       .def("hold", &ServoLoop::hold, "Stops as fast as limits allow, and rests.")
@@ -152,8 +160,10 @@ void bind_servo_loop(py::module_& m) {
            "Returns a number, one more each time, by which samples tell it; 0 is the first servo's.")
       .def("read", &read,
            "(N,) structured array: what was done in each cycle since the last call.\n\n"
-           "cycle, time [s] since start(), command (LoopCommand), configuration, restarted, status (Status), q and qdot (n,), target and\n"
-           "pose (4, 4) of the tip, pose_error, asked_twist and achieved_twist (6,), singular_values (NaN while holding),\n"
+           "cycle, time [s] since start(), command (LoopCommand), configuration, restarted, status (Status), q and "
+           "qdot (n,), target and\n"
+           "pose (4, 4) of the tip, pose_error, asked_twist and achieved_twist (6,), singular_values (NaN while "
+           "holding),\n"
            "singular and limiting_joints (bits), scale.")
       .def_property_readonly("statistics", &ServoLoop::statistics)
       .def_property_readonly("dt", &ServoLoop::dt, "[s]")

@@ -17,7 +17,8 @@ Potential potential_argument(const SingularSets& sets, double eta1, double eta2,
   return p;
 }
 
-using Recording = py::typing::Tuple<py::typing::List<py::typing::Tuple<py::object, py::ellipsis>>, py::typing::List<py::int_>>;
+using Recording =
+    py::typing::Tuple<py::typing::List<py::typing::Tuple<py::object, py::ellipsis>>, py::typing::List<py::int_>>;
 
 // Operations ("constant", value), ("sin" or "cos", joint) or ("+", "-" or "*", a, b), and the results' indices.
 Recording recording(const Tape& tape) {
@@ -49,13 +50,14 @@ void bind_singularities(py::module_& m) {
   };
   using Integers = py::typing::Tuple<py::int_, py::ellipsis>;
 
-  py::class_<SingularSets>(m, "SingularSets",
-                           "The known singular sets of an arm: potentials around them, and its manipulability in closed\n"
-                           "form (Beck et al. 2022, corrected and completed). q is (n,) in the chain's angles [rad], or\n"
-                           "(B, n): then every result has B rows.\n\n"
-                           "Set i is where ψ_i = Σ r² vanishes; its residuals r have no unit, and near the set ψ is about\n"
-                           "the squared distance in the joints' space. A set's codimension is the number of its residuals:\n"
-                           "those of codimension 1 are walls, across which r changes its sign.")
+  py::class_<SingularSets>(
+      m, "SingularSets",
+      "The known singular sets of an arm: potentials around them, and its manipulability in closed\n"
+      "form (Beck et al. 2022, corrected and completed). q is (n,) in the chain's angles [rad], or\n"
+      "(B, n): then every result has B rows.\n\n"
+      "Set i is where ψ_i = Σ r² vanishes; its residuals r have no unit, and near the set ψ is about\n"
+      "the squared distance in the joints' space. A set's codimension is the number of its residuals:\n"
+      "those of codimension 1 are walls, across which r changes its sign.")
       .def_property_readonly("name", &SingularSets::name, "Of the arm.")
       .def_property_readonly("dof", &SingularSets::dof, "Number of joints, n.")
       .def("__len__", &SingularSets::size)
@@ -111,7 +113,8 @@ void bind_singularities(py::module_& m) {
           py::arg("q"), "The residuals themselves, set after set: codimensions[i] numbers for set i.")
       .def(
           "potential",
-          [](const SingularSets& s, const ArrayLike& q, double eta1, double eta2, const MaybeArray& weights) -> NumberOrArray {
+          [](const SingularSets& s, const ArrayLike& q, double eta1, double eta2,
+             const MaybeArray& weights) -> NumberOrArray {
             const Potential p = potential_argument(s, eta1, eta2, weights);
             return number_or_array(map_configurations(
                 s.dof(), q, {}, [&](const JointVector& joints, double* out) { *out = s.potential(joints, p); }));
@@ -173,10 +176,12 @@ void bind_singularities(py::module_& m) {
             });
           },
           py::arg("q"), "Hessian (n, n) of the manipulability; zero on a singular set, where there is none.")
-      .def("_residual_tape", [](const SingularSets& s) { return recording(s.residual_tape()); },
-           "See sigmaik.singularities.symbolic_residuals.")
-      .def("_manipulability_tape", [](const SingularSets& s) { return recording(s.manipulability_tape()); },
-           "See sigmaik.singularities.symbolic_manipulability_squared.")
+      .def(
+          "_residual_tape", [](const SingularSets& s) { return recording(s.residual_tape()); },
+          "See sigmaik.singularities.symbolic_residuals.")
+      .def(
+          "_manipulability_tape", [](const SingularSets& s) { return recording(s.manipulability_tape()); },
+          "See sigmaik.singularities.symbolic_manipulability_squared.")
       .def("__reduce__",
            [](const py::object& self) -> py::typing::Tuple<py::object, py::typing::Tuple<py::str>> {
              const py::object load = py::module_::import("sigmaik.singularities").attr("load");

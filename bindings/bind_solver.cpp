@@ -14,10 +14,11 @@ py::array_t<bool> singular_mask(std::uint8_t bits, py::ssize_t size) {
 }  // namespace
 
 void bind_solver(py::module_& m) {
-  py::class_<Spectrum>(m, "Spectrum",
-                       "Singular value decomposition J = U diag(σ) Vᵀ by one-sided Jacobi rotations.\n\n"
-                       "Keeps the last decomposition as a warm start, and as what singular vectors continue where they\n"
-                       "are not unique.")
+  py::class_<Spectrum>(
+      m, "Spectrum",
+      "Singular value decomposition J = U diag(σ) Vᵀ by one-sided Jacobi rotations.\n\n"
+      "Keeps the last decomposition as a warm start, and as what singular vectors continue where they\n"
+      "are not unique.")
       .def(py::init<>())
       .def(
           "decompose",
@@ -33,19 +34,22 @@ void bind_solver(py::module_& m) {
             }
             return py::make_tuple(to_numpy(u), to_numpy(sigma), to_numpy(v));
           },
-          py::arg("J"),
-          "U (m, m), σ (min(m, n),) from large to small, V (n, min(m, n)) of J (m, n), m ≤ 6, n ≤ 16.")
+          py::arg("J"), "U (m, m), σ (min(m, n),) from large to small, V (n, min(m, n)) of J (m, n), m ≤ 6, n ≤ 16.")
       .def_property_readonly("sweeps", &Spectrum::sweeps, "Sweeps of rotations that the last call took.");
 
   py::class_<Solution>(m, "Solution", "Answer of VelocitySolver.solve().")
-      .def_property_readonly("qdot", [](const Solution& s) { return to_numpy(s.qdot); }, "(n,) [rad/s or m/s]")
+      .def_property_readonly(
+          "qdot", [](const Solution& s) { return to_numpy(s.qdot); }, "(n,) [rad/s or m/s]")
       .def_readonly("status", &Solution::status, "Status.OK or Status.DAMPED.")
-      .def_property_readonly("singular_values", [](const Solution& s) { return to_numpy(s.singular_values); },
-                             "(min(m, n),) from large to small, of the weighted task Jacobian.")
-      .def_property_readonly("achieved_twist", [](const Solution& s) { return to_numpy(s.achieved_twist); },
-                             "(m,) J q̇, in the rows of the J that came in.")
-      .def_property_readonly("directions", [](const Solution& s) { return to_numpy(s.directions); },
-                             "(m', m') columns u_i in the task's rows, angular ones times length_scale.")
+      .def_property_readonly(
+          "singular_values", [](const Solution& s) { return to_numpy(s.singular_values); },
+          "(min(m, n),) from large to small, of the weighted task Jacobian.")
+      .def_property_readonly(
+          "achieved_twist", [](const Solution& s) { return to_numpy(s.achieved_twist); },
+          "(m,) J q̇, in the rows of the J that came in.")
+      .def_property_readonly(
+          "directions", [](const Solution& s) { return to_numpy(s.directions); },
+          "(m', m') columns u_i in the task's rows, angular ones times length_scale.")
       .def_property_readonly(
           "singular", [](const Solution& s) { return singular_mask(s.singular, s.directions.cols()); },
           "(m',) truth values: the rule does not treat direction i as regular.")
@@ -100,7 +104,8 @@ void bind_solver(py::module_& m) {
           },
           py::arg("J"), py::arg("twist"), py::arg("posture") = py::none(), py::arg("rotation") = py::none(),
           "Joint velocities for a twist.\n\n"
-          "J: (m, n), 1 ≤ m ≤ 6, 1 ≤ n ≤ 16. With six rows the mask applies; with as many rows as the mask asks for it\n"
+          "J: (m, n), 1 ≤ m ≤ 6, 1 ≤ n ≤ 16. With six rows the mask applies; with as many rows as the mask asks for "
+          "it\n"
           "    is taken as masked. Without a mask, rows from the fourth on count as angular.\n"
           "twist: (m,) [m/s, rad/s].\n"
           "posture: (n,) q̇ [rad/s or m/s], goes through the method's own projector.\n"
@@ -116,8 +121,8 @@ void bind_solver(py::module_& m) {
         const Array j = array_argument(jacobian, "J", {-1, -1, -1}, "(B, m, n)");
         const BatchShape shape{static_cast<std::size_t>(j.shape(0)), static_cast<int>(j.shape(1)),
                                static_cast<int>(j.shape(2))};
-        const std::string need =
-            "(" + std::to_string(j.shape(0)) + ", " + std::to_string(j.shape(1)) + "), as J has (B, m)";
+        const std::string need = "(" + std::to_string(j.shape(0)) + ", " + std::to_string(j.shape(1)) +
+                                 "), as J has (B, m)";
         const Array t = array_argument(twist, "twist", {j.shape(0), j.shape(1)}, need.c_str());
         py::array_t<double> out({j.shape(0), j.shape(2)});
         double* data = out.mutable_data();

@@ -20,7 +20,8 @@ double time_argument(double time) {
 }  // namespace
 
 void bind_target_stream(py::module_& m) {
-  py::native_enum<StreamStatus>(m, "StreamStatus", "enum.IntEnum", "What a target is, ordered from the best to the worst.")
+  py::native_enum<StreamStatus>(m, "StreamStatus", "enum.IntEnum",
+                                "What a target is, ordered from the best to the worst.")
       .value("TRACKING", StreamStatus::Tracking, "as the samples say, or within the horizon of the last one")
       .value("COASTING", StreamStatus::Coasting, "longer without a sample than the horizon: coming to rest")
       .value("STALE", StreamStatus::Stale, "longer than the timeout: holding still")
@@ -28,7 +29,8 @@ void bind_target_stream(py::module_& m) {
       .finalize();
   py::native_enum<SampleStatus>(m, "SampleStatus", "enum.IntEnum", "What became of a sample.")
       .value("ACCEPTED", SampleStatus::Accepted)
-      .value("RELOCATED", SampleStatus::Relocated, "accepted after a run of refused ones: the target is elsewhere, or the clock was set")
+      .value("RELOCATED", SampleStatus::Relocated,
+             "accepted after a run of refused ones: the target is elsewhere, or the clock was set")
       .value("OUTLIER", SampleStatus::Outlier, "refused: too far from the last one for max_speed or max_angular_speed")
       .value("OUT_OF_ORDER", SampleStatus::OutOfOrder, "refused: its stamp is not later than the last one's")
       .value("INVALID", SampleStatus::Invalid, "refused: more than 10⁹ m away; what is not a pose raises")
@@ -47,13 +49,16 @@ void bind_target_stream(py::module_& m) {
       });
 
   py::class_<Target>(m, "Target", "Where to be now, and how to move: servo.update(target.pose, target.twist).")
-      .def_property_readonly("pose", [](const Target& t) { return to_numpy(t.pose.matrix()); }, "(4, 4) in base.")
-      .def_property_readonly("twist", [](const Target& t) { return to_numpy(t.twist); },
-                             "(6,) derivative of the pose: [v; ω], base axes, at its origin.")
+      .def_property_readonly(
+          "pose", [](const Target& t) { return to_numpy(t.pose.matrix()); }, "(4, 4) in base.")
+      .def_property_readonly(
+          "twist", [](const Target& t) { return to_numpy(t.twist); },
+          "(6,) derivative of the pose: [v; ω], base axes, at its origin.")
       .def_readonly("status", &Target::status, "See StreamStatus.")
       .def_readonly("age", &Target::age, "[s] since the newest sample was taken; 0 before the first.")
       .def("__repr__", [](const Target& t) {
-        return std::string("Target(status=") + to_string(t.status) + ", age=" + py::str(py::float_(t.age)).cast<std::string>() + ")";
+        return std::string("Target(status=") + to_string(t.status) +
+               ", age=" + py::str(py::float_(t.age)).cast<std::string>() + ")";
       });
 
   py::class_<TargetStream>(
@@ -62,11 +67,13 @@ void bind_target_stream(py::module_& m) {
       "    stream.push(stamp, pose)                     # whenever there is one: stamp = when it was taken\n"
       "    target = stream.at(now)                      # each cycle, on the same clock\n"
       "    servo.update(target.pose, target.twist)\n\n"
-      "Samples may come late, doubled, wrong or not at all. Targets are continuous, with their twist, and never faster\n"
-      "than max_speed and max_angular_speed: not when a sample arrives, not when the stream stops or starts again, not\n"
+      "Samples may come late, doubled, wrong or not at all. Targets are continuous, with their twist, and never "
+      "faster\n"
+      "than max_speed and max_angular_speed: not when a sample arrives, not when the stream stops or starts again, "
+      "not\n"
       "when the target is found elsewhere.")
-      .def(py::init([](const std::string& mode, double max_speed, double max_angular_speed, double smoothing, double latency,
-                       double horizon, double timeout, double noise_linear, double noise_angular,
+      .def(py::init([](const std::string& mode, double max_speed, double max_angular_speed, double smoothing,
+                       double latency, double horizon, double timeout, double noise_linear, double noise_angular,
                        double acceleration_linear, double acceleration_angular, int relocate) {
              TargetStreamOptions options;
              options.mode = mode_argument(mode);
@@ -92,14 +99,19 @@ void bind_target_stream(py::module_& m) {
            py::arg("acceleration_linear") = TargetStreamOptions{}.acceleration_linear,
            py::arg("acceleration_angular") = TargetStreamOptions{}.acceleration_angular,
            py::arg("relocate") = TargetStreamOptions{}.relocate,
-           "mode: where the target is between samples, and after the last one. 'hold': at the last sample, for devices that\n"
-           "    send only changes; 'interpolate': on a smooth curve through the samples, `latency` ago; 'predict': where a\n"
+           "mode: where the target is between samples, and after the last one. 'hold': at the last sample, for devices "
+           "that\n"
+           "    send only changes; 'interpolate': on a smooth curve through the samples, `latency` ago; 'predict': "
+           "where a\n"
            "    constant-velocity Kalman filter expects it now.\n"
-           "max_speed [m/s], max_angular_speed [rad/s]: nothing is faster; a sample that would have to be is an outlier.\n"
-           "smoothing: [s] time constant of the way from where the target is to where a new sample says it is; at 0 the\n"
+           "max_speed [m/s], max_angular_speed [rad/s]: nothing is faster; a sample that would have to be is an "
+           "outlier.\n"
+           "smoothing: [s] time constant of the way from where the target is to where a new sample says it is; at 0 "
+           "the\n"
            "    twist jumps.\n"
            "latency: [s] 'interpolate' plays so late: the sensor's delay, and one or two samples.\n"
-           "horizon, timeout: [s] so long after its last sample the target moves on as it did, and by then it has come to\n"
+           "horizon, timeout: [s] so long after its last sample the target moves on as it did, and by then it has come "
+           "to\n"
            "    rest, and the stream is stale.\n"
            "noise_linear [m], noise_angular [rad]: standard deviation of a sample, each axis.\n"
            "acceleration_linear [m/s²], acceleration_angular [rad/s²]: of what the target may do between samples.\n"
@@ -114,7 +126,8 @@ void bind_target_stream(py::module_& m) {
             }
           },
           py::arg("start") = py::none(),
-          "Forgets everything. The next target is at `start` (4, 4), such as the tip's pose, and goes to the samples from\n"
+          "Forgets everything. The next target is at `start` (4, 4), such as the tip's pose, and goes to the samples "
+          "from\n"
           "there; with None it is where the first sample is.")
       .def(
           "push",
@@ -126,7 +139,8 @@ void bind_target_stream(py::module_& m) {
       .def(
           "at", [](TargetStream& s, double time) { return s.at(time_argument(time)); }, py::arg("time"),
           "The target at a time [s] not before that of the last call; else the last one again.")
-      .def_property_readonly("counts", &TargetStream::counts, py::return_value_policy::copy, "How many samples had which fate.");
+      .def_property_readonly("counts", &TargetStream::counts, py::return_value_policy::copy,
+                             "How many samples had which fate.");
 }
 
 }  // namespace sigmaik::bindings

@@ -14,7 +14,8 @@ void bind_status(py::module_& m) {
       .value("DAMPED", Status::Damped, "near a singularity: part of the command is damped, or cannot be done")
       .value("LIMITED", Status::Limited, "a joint limit holds part of the command back")
       .value("HOLDING", Status::Holding, "no motion: there is no target, or none is allowed")
-      .value("BAD_INPUT", Status::BadInput, "NaN, infinite, not a rotation, or a wrong size: the arm stops as fast as its limits allow")
+      .value("BAD_INPUT", Status::BadInput,
+             "NaN, infinite, not a rotation, or a wrong size: the arm stops as fast as its limits allow")
       .finalize();
 
   m.def(

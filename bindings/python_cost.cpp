@@ -35,7 +35,8 @@ class PythonCost final : public BatchCost {
   static py::object method(const py::object& object, const char* name) {
     py::object found = py::getattr(object, name, py::none());
     if (!found.is_none() && PyCallable_Check(found.ptr()) == 0) {
-      throw Error(py::str(py::type::of(object).attr("__name__")).cast<std::string>() + "." + name + " cannot be called");
+      throw Error(py::str(py::type::of(object).attr("__name__")).cast<std::string>() + "." + name +
+                  " cannot be called");
     }
     return found;
   }
@@ -48,13 +49,14 @@ class PythonCost final : public BatchCost {
     const std::string name = name_ + "." + what;
     const Array array = one.empty()
                             ? array_argument(answer, name.c_str(), {rows}, ("(" + std::to_string(rows) + ",)").c_str())
-                            : array_argument(answer, name.c_str(), {rows, one.front()},
-                                             ("(" + std::to_string(rows) + ", " + std::to_string(one.front()) + ")").c_str());
+                            : array_argument(
+                                  answer, name.c_str(), {rows, one.front()},
+                                  ("(" + std::to_string(rows) + ", " + std::to_string(one.front()) + ")").c_str());
     std::copy(array.data(), array.data() + array.size(), out);
   }
 
-  // (f(q + h e_j) − f(q − h e_j))/(2h), all in one call. With h = ∛ε max(1, |q_j|) the error of the difference, h² f‴/6, and
-  // that of rounding, ε f/h, are of one size.
+  // (f(q + h e_j) − f(q − h e_j))/(2h), all in one call. With h = ∛ε max(1, |q_j|) the error of the difference, h²
+  // f‴/6, and that of rounding, ε f/h, are of one size.
   void differences(std::size_t count, const double* q, double* gradient) const {
     const auto n = static_cast<std::size_t>(dof_);
     std::vector<double> around, value(2 * count * n), width(count * n);

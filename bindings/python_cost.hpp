@@ -10,9 +10,9 @@
 
 namespace sigmaik::bindings {
 
-/// What `cost` says, null for nothing, and Python objects with `value(q: (B, n)) -> (B,)` and, unless differences are to do,
-/// `gradient(q: (B, n)) -> (B, n)`, added up. evaluate() holds the GIL while it calls them; it throws what they raise, and
-/// Error where an answer has another shape or is not finite.
+/// What `cost` says, null for nothing, and Python objects with `value(q: (B, n)) -> (B,)` and, unless differences are
+/// to do, `gradient(q: (B, n)) -> (B, n)`, added up. evaluate() holds the GIL while it calls them; it throws what they
+/// raise, and Error where an answer has another shape or is not finite.
 std::shared_ptr<const planning::BatchCost> with_python_costs(planning::JointCostPtr cost, int dof,
                                                              const std::vector<py::object>& python);
 

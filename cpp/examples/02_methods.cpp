@@ -11,11 +11,14 @@ int main(int argc, char** argv) try {
   sigmaik::Twist twist;
   twist << 0.1, 0, 0.1, 0, 0, 0;
 
-  const sigmaik::Method methods[] = {
-      sigmaik::PseudoInverse{},         sigmaik::DampedLeastSquares{.damping = 0.1},
-      sigmaik::AdaptiveDampedLeastSquares{}, sigmaik::SelectivelyDampedLeastSquares{},
-      sigmaik::JParse{},                sigmaik::JacobianProjection{},
-      sigmaik::JacobianSafety{},        sigmaik::JacobianSafetyProjection{}};
+  const sigmaik::Method methods[] = {sigmaik::PseudoInverse{},
+                                     sigmaik::DampedLeastSquares{.damping = 0.1},
+                                     sigmaik::AdaptiveDampedLeastSquares{},
+                                     sigmaik::SelectivelyDampedLeastSquares{},
+                                     sigmaik::JParse{},
+                                     sigmaik::JacobianProjection{},
+                                     sigmaik::JacobianSafety{},
+                                     sigmaik::JacobianSafetyProjection{}};
   for (const sigmaik::Method& method : methods) {
     sigmaik::VelocitySolver solver(method);
     const sigmaik::Solution s = solver.solve(state.jacobian, twist);

@@ -31,8 +31,8 @@ int main(int argc, char** argv) try {
   sigmaik::solve_batch(sigmaik::JParse{}, 1.0, {kCount, 6, n}, jacobian.data(), twist.data(), qdot.data(), nullptr,
                        threads);
   const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
-  const double fastest = std::abs(*std::max_element(
-      qdot.begin(), qdot.end(), [](double a, double b) { return std::abs(a) < std::abs(b); }));
+  const double fastest = std::abs(
+      *std::max_element(qdot.begin(), qdot.end(), [](double a, double b) { return std::abs(a) < std::abs(b); }));
   std::printf("%.2f million solves a second, largest joint speed %.1f rad/s\n", 1e-6 * kCount / seconds.count(),
               fastest);
   return 0;

@@ -55,8 +55,8 @@ int main(int argc, char** argv) try {
   const auto urdf = std::filesystem::path(argv[1]).parent_path() / "franka_panda.urdf";
   sigmaik::Chain arm = sigmaik::Chain::from_urdf(urdf.string(), "", "flange");
   sigmaik::JointLimits limits = arm.limits();  // positions from the URDF, the rest from libfranka's rate_limiting.h
-  limits.velocity << 2.175, 2.175, 2.175, 2.175, 2.61, 2.61, 2.61;         // [rad/s]
-  limits.acceleration << 15.0, 7.5, 10.0, 12.5, 15.0, 20.0, 20.0;          // [rad/s²]
+  limits.velocity << 2.175, 2.175, 2.175, 2.175, 2.61, 2.61, 2.61;          // [rad/s]
+  limits.acceleration << 15.0, 7.5, 10.0, 12.5, 15.0, 20.0, 20.0;           // [rad/s²]
   limits.jerk << 7500.0, 3750.0, 5000.0, 6250.0, 7500.0, 10000.0, 10000.0;  // [rad/s³]
   arm = arm.with_limits(limits);
 

@@ -1,4 +1,5 @@
-// A motion in little time that keeps clear of singularities, and what it costs. The same as 06_clear_of_singularities.py.
+// A motion in little time that keeps clear of singularities, and what it costs. The same as
+// 06_clear_of_singularities.py.
 #include <algorithm>
 #include <cstdio>
 
@@ -19,8 +20,7 @@ int main(int argc, char** argv) try {
   const struct {
     const char* name;
     planning::JointCostPtr cost;
-  } cases[] = {{"straight there", nullptr},
-               {"clear of singularities", planning::manipulability_cost(arm, 10.0, 1e-6)}};
+  } cases[] = {{"straight there", nullptr}, {"clear of singularities", planning::manipulability_cost(arm, 10.0, 1e-6)}};
   for (const auto& [name, cost] : cases) {
     planning::TimeOptimal planner(arm, cost, {.time_weight = 600.0});
     const planning::TimeOptimalResult plan = planner.solve(problem);

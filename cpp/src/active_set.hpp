@@ -84,8 +84,8 @@ class ActiveSet {
     active_ = p_.active;
 
     const int limit = 4 * (n_ + p_.inequalities) + 40;
-    bool fits = true;   // no step has been blocked yet: the guess may do
-    int idle = 0;       // steps that moved nothing, in a row
+    bool fits = true;  // no step has been blocked yet: the guess may do
+    int idle = 0;      // steps that moved nothing, in a row
     barred_ = 0;
     for (p_.steps = 1; p_.steps <= limit; ++p_.steps) {
       solve_levels();
@@ -123,9 +123,9 @@ class ActiveSet {
   }
 
  private:
-  static constexpr double kRank = 1e-12;   // a row's rest below this part of its level's longest row is rounding
-  static constexpr double kSign = 1e-11;   // a multiplier below this part of its terms has no sign
-  static constexpr double kNear = 1e-13;   // a bound is kept when it is missed by this part of the numbers around
+  static constexpr double kRank = 1e-12;  // a row's rest below this part of its level's longest row is rounding
+  static constexpr double kSign = 1e-11;  // a multiplier below this part of its terms has no sign
+  static constexpr double kNear = 1e-13;  // a bound is kept when it is missed by this part of the numbers around
 
   SIGMAIK_INLINE std::uint32_t held() const { return at_lower_ | at_upper_; }
 
@@ -597,7 +597,7 @@ class ActiveSet {
 
   ActiveSetProblem<P>& p_;
   const int n_;
-  int first_[4];                  // of a level, among the problem's rows
+  int first_[4];                   // of a level, among the problem's rows
   double square_[kActiveSetRows];  // of the problem's rows
   double noise_[3];
   double size_ = 0.0;      // of the goal

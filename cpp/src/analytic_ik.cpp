@@ -26,19 +26,18 @@ constexpr double kLimit = 1e-12;  // beyond a limit by rounding [rad]
 constexpr double kLargestAngle = 1e9;  // of q: beyond, an angle has no digits left
 
 // cos and angle where the sine is k/16.
-constexpr double kNodes[12][2] = {
-    {1.0, 0.0},
-    {0.998044963916957, 0.06254076179649139},
-    {0.9921567416492215, 0.1253278311680654},
-    {0.982264602843857, 0.1886163861754041},
-    {0.9682458365518543, 0.25268025514207865},
-    {0.9499177595981665, 0.31782370392788073},
-    {0.9270248108869579, 0.3843967744956391},
-    {0.899218410621135, 0.4528165947449256},
-    {0.8660254037844386, 0.5235987755982989},
-    {0.8267972847076845, 0.5974064166453502},
-    {0.7806247497997998, 0.6751315329370317},
-    {0.7261843774138906, 0.758040765426236}};
+constexpr double kNodes[12][2] = {{1.0, 0.0},
+                                  {0.998044963916957, 0.06254076179649139},
+                                  {0.9921567416492215, 0.1253278311680654},
+                                  {0.982264602843857, 0.1886163861754041},
+                                  {0.9682458365518543, 0.25268025514207865},
+                                  {0.9499177595981665, 0.31782370392788073},
+                                  {0.9270248108869579, 0.3843967744956391},
+                                  {0.899218410621135, 0.4528165947449256},
+                                  {0.8660254037844386, 0.5235987755982989},
+                                  {0.8267972847076845, 0.5974064166453502},
+                                  {0.7806247497997998, 0.6751315329370317},
+                                  {0.7261843774138906, 0.758040765426236}};
 
 // From the angle in the first octant to that in the others of the half turn: no branches, which nothing would predict.
 constexpr double kOctants[4][2] = {{0.0, 1.0}, {0.5 * kPi, -1.0}, {kPi, -1.0}, {0.5 * kPi, 1.0}};
@@ -51,8 +50,8 @@ inline double angle_of(double c, double s) noexcept {
   const double large = std::max(x, y), small = std::min(x, y);
   const int k = small < 0.71 ? static_cast<int>(16.0 * small + 0.5) : 11;
   const double d = small * kNodes[k][0] - large * (0.0625 * k), t = d * d;
-  const double series =
-      t * (1.0 / 6.0 + t * (3.0 / 40.0 + t * (15.0 / 336.0 + t * (105.0 / 3456.0 + t * (945.0 / 42240.0)))));
+  const double series = t * (1.0 / 6.0 +
+                             t * (3.0 / 40.0 + t * (15.0 / 336.0 + t * (105.0 / 3456.0 + t * (945.0 / 42240.0)))));
   const auto& octant = kOctants[static_cast<int>(y > x) + 2 * static_cast<int>(c < 0.0)];
   return std::copysign(octant[0] + octant[1] * (kNodes[k][1] + (d + d * series)), s);
 }
@@ -182,8 +181,8 @@ AnalyticIk::AnalyticIk(const Chain& chain) : chain_(chain) {
     if (elbow_.fore <= least) fault("the wrist centre lies on axis 3 (", elbow_.fore, " m off)");
   }
   detail::require(faults.empty(),
-                  "closed-form inverse kinematics needs a spherical wrist after parallel axes 2 and 3; '",
-                  chain.base(), "' to '", chain.tip(), "': ", faults);
+                  "closed-form inverse kinematics needs a spherical wrist after parallel axes 2 and 3; '", chain.base(),
+                  "' to '", chain.tip(), "': ", faults);
 
   const JointConstants& first = chain.constants()[0];
   shoulder_.from_base = (first.rotation * shoulder).transpose();
@@ -405,7 +404,7 @@ struct AnalyticWalk {
   bool wrists(const Vector3d& x, const Vector3d& z, Rule& rule, const Branch& base) const noexcept {
     const auto& w = ik.wrist_;
     const double sine = std::sqrt(z[0] * z[0] + z[1] * z[1]);  // of the angle from axis 4 to axis 6
-    Turn side;                                                  // half of it
+    Turn side;                                                 // half of it
     if (z[2] >= 0.0) {
       side.c = std::sqrt(0.5 + 0.5 * z[2]);
       side.s = 0.5 * sine / side.c;

@@ -16,8 +16,7 @@ void solve_batch(const Method& method, double length_scale, const BatchShape& sh
                  const double* twist, double* qdot, std::int8_t* status, int threads) {
   const int m = shape.rows, n = shape.cols;
   detail::require(m >= 1 && m <= kMaxTask, "the Jacobians have ", m, " rows; 1 to ", kMaxTask, " are supported");
-  detail::require(n >= 1 && n <= kMaxJoints, "the Jacobians have ", n, " columns; 1 to ", kMaxJoints,
-                  " are supported");
+  detail::require(n >= 1 && n <= kMaxJoints, "the Jacobians have ", n, " columns; 1 to ", kMaxJoints, " are supported");
   detail::require(threads >= 1, "threads = ", threads, " must be at least 1");
   const VelocitySolver prototype(method, length_scale);
 

@@ -56,16 +56,14 @@ void check_origin(const Segment& s) {
           s.origin.translation().norm(), " m away, which is absurd");
 }
 
-// A rotation that takes z to `axis` (Duff et al. 2017, "Building an orthonormal basis, revisited"): exact for coordinate
-// axes, the identity for z, and accurate close to −z, where the shortest rotation is not.
+// A rotation that takes z to `axis` (Duff et al. 2017, "Building an orthonormal basis, revisited"): exact for
+// coordinate axes, the identity for z, and accurate close to −z, where the shortest rotation is not.
 Eigen::Matrix3d from_z(const Eigen::Vector3d& axis) {
   const double x = axis.x(), y = axis.y(), z = axis.z();
   const double sign = std::copysign(1.0, z);
   const double a = -1.0 / (sign + z), b = x * y * a;
   Eigen::Matrix3d r;
-  r << 1.0 + sign * x * x * a, b,                x,
-       sign * b,               sign + y * y * a, y,
-       -sign * x,              -y,               z;
+  r << 1.0 + sign * x * x * a, b, x, sign * b, sign + y * y * a, y, -sign * x, -y, z;
   return r;
 }
 
@@ -114,8 +112,8 @@ Chain::Chain(std::string base, std::vector<Segment> segments) {
   const int n = static_cast<int>(movable.size());
   model->dof = n;
   JointLimits& limits = model->limits;
-  for (JointVector* v : {&limits.lower, &limits.upper, &limits.velocity, &limits.acceleration, &limits.jerk,
-                         &limits.effort}) {
+  for (JointVector* v :
+       {&limits.lower, &limits.upper, &limits.velocity, &limits.acceleration, &limits.jerk, &limits.effort}) {
     v->resize(n);
   }
 
@@ -150,12 +148,10 @@ Chain::Chain(std::string base, std::vector<Segment> segments) {
 }
 
 Chain Chain::with_limits(const JointLimits& limits) const {
-  const std::pair<const char*, const JointVector*> all[] = {{"lower", &limits.lower},
-                                                            {"upper", &limits.upper},
-                                                            {"velocity", &limits.velocity},
-                                                            {"acceleration", &limits.acceleration},
-                                                            {"jerk", &limits.jerk},
-                                                            {"effort", &limits.effort}};
+  const std::pair<const char*, const JointVector*> all[] = {
+      {"lower", &limits.lower},       {"upper", &limits.upper},
+      {"velocity", &limits.velocity}, {"acceleration", &limits.acceleration},
+      {"jerk", &limits.jerk},         {"effort", &limits.effort}};
   for (const auto& [what, values] : all) {
     require(values->size() == dof(), what, " has ", values->size(), " entries, the chain ", dof(), " joints");
   }

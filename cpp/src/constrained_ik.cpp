@@ -16,7 +16,7 @@ namespace {
 using detail::require;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kMet = 1e-9;  // [m, rad] an error this small is none
+constexpr double kMet = 1e-9;    // [m, rad] an error this small is none
 constexpr double kAgree = 0.01;  // of the width of a joint's bounds: velocities this close are the same
 
 // The rows of the task that are in `part`, or that are not.
@@ -66,8 +66,8 @@ ConstrainedIk::ConstrainedIk(Chain chain, const ConstrainedIkOptions& options)
     require(options.beta[k] >= 0.0 && std::isfinite(options.beta[k]), "beta of row ", kRows[i], " = ", options.beta[k],
             " must be finite and at least 0");
     require(options.max_error[k] > 0.0, "max_error of row ", kRows[i], " = ", options.max_error[k], " must be above 0");
-    require(!approximate_.mask[i] || options.alpha[k] > 0.0 || options.beta[k] > 0.0, "alpha and beta of row ", kRows[i],
-            " are both 0: leave the row out of the mask instead");
+    require(!approximate_.mask[i] || options.alpha[k] > 0.0 || options.beta[k] > 0.0, "alpha and beta of row ",
+            kRows[i], " are both 0: leave the row out of the mask instead");
     if (approximate_.mask[i] && options.max_error[k] < kInfinity) error_rows_ += 2;
   }
   if (options.gamma) {
@@ -132,9 +132,7 @@ ConstrainedIkStep ConstrainedIk::step(const Pose& target) noexcept {
   step.error = -pose_error(state_.tip, target);
   step.path_error = -pose_error(state_.tip, reference_);
   const TaskVector missed = select_rows(options_.task, state_.tip.linear(), step.error);
-  step.status = held                                 ? Status::Limited
-                : missed.cwiseAbs().maxCoeff() <= kMet ? Status::Ok
-                                                       : Status::Damped;
+  step.status = held ? Status::Limited : missed.cwiseAbs().maxCoeff() <= kMet ? Status::Ok : Status::Damped;
   return step;
 }
 
@@ -146,7 +144,8 @@ bool ConstrainedIk::try_analytic(const Pose& target, ConstrainedIkStep& step) no
   if (nearest.status != AnalyticStatus::Ok || !nearest.branch.within_limits) return false;
   step.qdot = (nearest.branch.q - from) / options_.dt;
   const VelocityBounds& bounds = tracker_.bounds();
-  if ((step.qdot.array() > bounds.upper.array()).any() || (step.qdot.array() < bounds.lower.array()).any()) return false;
+  if ((step.qdot.array() > bounds.upper.array()).any() || (step.qdot.array() < bounds.lower.array()).any())
+    return false;
   step.used = IkSource::Analytic;
   return true;
 }

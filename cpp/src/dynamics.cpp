@@ -30,8 +30,8 @@ void check_payload(const Inertia& payload) {
   detail::require(payload.center_of_mass.allFinite() && t.allFinite(), "payload: an entry is not finite");
   const double slack = 1e-9 * t.cwiseAbs().maxCoeff();  // what rounding in a data sheet's conversion leaves
   detail::require((t - t.transpose()).cwiseAbs().maxCoeff() <= slack, "payload: the tensor is not symmetric");
-  const Eigen::Vector3d moments =
-      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(t, Eigen::EigenvaluesOnly).eigenvalues();
+  const Eigen::Vector3d moments = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(t, Eigen::EigenvaluesOnly)
+                                      .eigenvalues();
   detail::require(moments[0] >= -slack && moments[2] <= moments[0] + moments[1] + slack, "payload: principal moments ",
                   moments[0], ", ", moments[1], ", ", moments[2],
                   " are no body's: none is negative, nor more than the sum of the other two");

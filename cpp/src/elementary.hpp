@@ -1,5 +1,6 @@
 #pragma once
-// sin, cos and exp of several numbers at once, to about an ulp: reductions after Cody and Waite; sin and cos by Cephes' polynomials.
+// sin, cos and exp of several numbers at once, to about an ulp: reductions after Cody and Waite; sin and cos by Cephes'
+// polynomials.
 
 #include <cmath>
 
@@ -37,9 +38,10 @@ SIGMAIK_INLINE void sincos_reduced(Vector<lanes> x, Vector<lanes>& sine, Vector<
   const V z = r * r;
   // Estrin's scheme: short chains of dependent operations.
   const V w = z * z;
-  const V s = r + r * z * ((8.33333333332211858878e-3 * z - 1.66666666666666307295e-1) +
-                           w * ((2.75573136213857245213e-6 * z - 1.98412698295895385996e-4) +
-                                w * (1.58962301576546568060e-10 * z - 2.50507477628578072866e-8)));
+  const V s = r + r * z *
+                      ((8.33333333332211858878e-3 * z - 1.66666666666666307295e-1) +
+                       w * ((2.75573136213857245213e-6 * z - 1.98412698295895385996e-4) +
+                            w * (1.58962301576546568060e-10 * z - 2.50507477628578072866e-8)));
   const V c = (1.0 - 0.5 * z) + w * ((-1.38888888888730564116e-3 * z + 4.16666666666665929218e-2) +
                                      w * ((-2.75573141792967388112e-7 * z + 2.48015872888517045348e-5) +
                                           w * (-1.13585365213876817300e-11 * z + 2.08757008419747316778e-9)));

@@ -77,15 +77,15 @@ const char* to_string(Index index) noexcept {
 
 IndexFunction::IndexFunction(Index index, const IndexOptions& options)
     : index_(index), angular_(options.length_scale), inverse_k_(1.0 / options.k) {
-  detail::require(std::isfinite(options.length_scale) && options.length_scale > 0.0, "length_scale = ",
-                  options.length_scale, " must be finite and greater than 0");
+  detail::require(std::isfinite(options.length_scale) && options.length_scale > 0.0,
+                  "length_scale = ", options.length_scale, " must be finite and greater than 0");
   detail::require(std::isfinite(options.k) && options.k > 0.0, "k = ", options.k, " must be finite and greater than 0");
   if (options.sigma.size() == 0 || index != Index::GeometryAware) return;
   const TaskMatrix& sigma = options.sigma;
   detail::require(sigma.rows() == sigma.cols(), "Σ is ", sigma.rows(), "×", sigma.cols(), "; it must be square");
-  detail::require(sigma.allFinite() && (sigma - sigma.transpose()).cwiseAbs().maxCoeff() <=
-                                           1e-9 * sigma.cwiseAbs().maxCoeff(),
-                  "Σ must be finite and symmetric");
+  detail::require(
+      sigma.allFinite() && (sigma - sigma.transpose()).cwiseAbs().maxCoeff() <= 1e-9 * sigma.cwiseAbs().maxCoeff(),
+      "Σ must be finite and symmetric");
   const Eigen::SelfAdjointEigenSolver<TaskMatrix> eigen(sigma);
   detail::require(eigen.eigenvalues()[0] > 0.0, "Σ must be positive definite; its smallest eigenvalue is ",
                   eigen.eigenvalues()[0]);
@@ -106,8 +106,8 @@ double IndexFunction::value(const Chain& chain, const JointRef& q, JointVector& 
   return gradient(state.jacobian, out);
 }
 
-// With J_j = [v_j; ω_j], ∂_kJ x = [ω_k × Σ_{j≥k} v_j x_j + (Σ_{j<k} ω_j x_j) × v_k; ω_k × Σ_{j≥k} ω_j x_j]: running sums
-// give u_iᵀ ∂_kJ v_i for all k in one pass.
+// With J_j = [v_j; ω_j], ∂_kJ x = [ω_k × Σ_{j≥k} v_j x_j + (Σ_{j<k} ω_j x_j) × v_k; ω_k × Σ_{j≥k} ω_j x_j]: running
+// sums give u_iᵀ ∂_kJ v_i for all k in one pass.
 double IndexFunction::gradient(const Jacobian& jacobian, JointVector& out) const noexcept {
   const int n = static_cast<int>(jacobian.cols());
   Jacobian weighted = jacobian;
@@ -124,7 +124,8 @@ double IndexFunction::gradient(const Jacobian& jacobian, JointVector& out) const
     if (whiten_.size() != 0) u = whiten_.lazyProduct(u).eval();
     const Eigen::Vector3d up = u.head<3>(), uo = angular_ * u.tail<3>();
     const auto x = spectrum.v(i);
-    Eigen::Vector3d v = Eigen::Vector3d::Zero(), w = v, w_before = v;  // Σ_{j≥k} v_j x_j, Σ_{j≥k} ω_j x_j, Σ_{j<k} ω_j x_j
+    Eigen::Vector3d v = Eigen::Vector3d::Zero(), w = v,
+                    w_before = v;  // Σ_{j≥k} v_j x_j, Σ_{j≥k} ω_j x_j, Σ_{j<k} ω_j x_j
     for (int j = 0; j < n; ++j) w_before += x[j] * jacobian.col(j).tail<3>();
     for (int k = n - 1; k >= 0; --k) {
       const Eigen::Vector3d v_k = jacobian.col(k).head<3>(), w_k = jacobian.col(k).tail<3>();

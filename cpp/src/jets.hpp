@@ -1,6 +1,6 @@
 #pragma once
-// Scalars to put through a template: truncated Taylor series that know when compiling which joints they depend on, and a
-// recorder. Templates use x·y, x + y, x − y, number·x and x + number alone.
+// Scalars to put through a template: truncated Taylor series that know when compiling which joints they depend on, and
+// a recorder. Templates use x·y, x + y, x − y, number·x and x + number alone.
 
 #include <bit>
 #include <utility>
@@ -20,7 +20,7 @@ template <unsigned mask, typename Function>
 SIGMAIK_INLINE void for_joints(Function&& f) {
   if constexpr (mask != 0) {
     f(Joint<std::countr_zero(mask)>{});
-    for_joints<mask & (mask - 1)>(f);
+    for_joints<mask&(mask - 1)>(f);
   }
 }
 
@@ -48,8 +48,7 @@ SIGMAIK_INLINE void fill(Jet<mask, order>& z, First&& f, Second&& s) {
   for_joints<mask>([&](auto i) __attribute__((always_inline)) {
     z.g[Z::at(i)] = f(i);
     if constexpr (order == 2) {
-      for_joints<(mask & ((2u << i) - 1u))>(
-          [&](auto j) __attribute__((always_inline)) { z.h[Z::at(i, j)] = s(i, j); });
+      for_joints<(mask & ((2u << i) - 1u))>([&](auto j) __attribute__((always_inline)) { z.h[Z::at(i, j)] = s(i, j); });
     }
   });
 }
@@ -63,9 +62,12 @@ SIGMAIK_INLINE Jet<a | b, order> operator+(const Jet<a, order>& x, const Jet<b, 
   fill(
       z,
       [&](auto i) __attribute__((always_inline)) {
-        if constexpr (!Y::has(i)) return x.g[X::at(i)];
-        else if constexpr (!X::has(i)) return y.g[Y::at(i)];
-        else return x.g[X::at(i)] + y.g[Y::at(i)];
+        if constexpr (!Y::has(i))
+          return x.g[X::at(i)];
+        else if constexpr (!X::has(i))
+          return y.g[Y::at(i)];
+        else
+          return x.g[X::at(i)] + y.g[Y::at(i)];
       },
       [&](auto i, auto j) __attribute__((always_inline)) {
         double sum = 0.0;
@@ -106,9 +108,12 @@ SIGMAIK_INLINE Jet<a | b, order> operator*(const Jet<a, order>& x, const Jet<b, 
   fill(
       z,
       [&](auto i) __attribute__((always_inline)) {
-        if constexpr (!Y::has(i)) return y.v * x.g[X::at(i)];
-        else if constexpr (!X::has(i)) return x.v * y.g[Y::at(i)];
-        else return y.v * x.g[X::at(i)] + x.v * y.g[Y::at(i)];
+        if constexpr (!Y::has(i))
+          return y.v * x.g[X::at(i)];
+        else if constexpr (!X::has(i))
+          return x.v * y.g[Y::at(i)];
+        else
+          return y.v * x.g[X::at(i)] + x.v * y.g[Y::at(i)];
       },
       [&](auto i, auto j) __attribute__((always_inline)) {
         double sum = 0.0;
@@ -139,12 +144,8 @@ struct Recorded {
   friend Recorded operator*(const Recorded& x, const Recorded& y) {
     return record(x.tape, {Operation::Multiply, x.index, y.index});
   }
-  friend Recorded operator*(double f, const Recorded& x) {
-    return record(x.tape, {Operation::Constant, 0, 0, f}) * x;
-  }
-  friend Recorded operator+(const Recorded& x, double c) {
-    return x + record(x.tape, {Operation::Constant, 0, 0, c});
-  }
+  friend Recorded operator*(double f, const Recorded& x) { return record(x.tape, {Operation::Constant, 0, 0, f}) * x; }
+  friend Recorded operator+(const Recorded& x, double c) { return x + record(x.tape, {Operation::Constant, 0, 0, c}); }
 };
 
 // The joints' sines and cosines, in each kind of scalar: x.s(Joint<i>), x.c(Joint<i>).

@@ -146,8 +146,8 @@ KDL::Chain to_kdl(const Chain& chain) {
       joint = KDL::Joint(s.joint_name, origin.p, origin.M * to_kdl_vector(s.axis),
                          s.type == JointType::Prismatic ? KDL::Joint::TransAxis : KDL::Joint::RotAxis);
     }
-    result.addSegment(KDL::Segment(s.link_name, joint, origin,
-                                   s.inertia ? to_kdl(*s.inertia) : KDL::RigidBodyInertia::Zero()));
+    result.addSegment(
+        KDL::Segment(s.link_name, joint, origin, s.inertia ? to_kdl(*s.inertia) : KDL::RigidBodyInertia::Zero()));
   }
   return result;
 }

@@ -1,6 +1,6 @@
 #pragma once
-// Short vectors of doubles in the compiler's vector types. `lanes` is the width of a register: two in every x86-64, four
-// where the processor has AVX2.
+// Short vectors of doubles in the compiler's vector types. `lanes` is the width of a register: two in every x86-64,
+// four where the processor has AVX2.
 
 namespace sigmaik::detail {
 

@@ -45,8 +45,7 @@ constexpr auto run = run_baseline<P>;
 #endif
 
 int unknowns_of(const LeastSquaresProblem& p) noexcept {
-  return static_cast<int>(
-      std::max({p.A.cols(), p.C.cols(), p.G.cols(), p.lower.size(), p.upper.size()}));
+  return static_cast<int>(std::max({p.A.cols(), p.C.cols(), p.G.cols(), p.lower.size(), p.upper.size()}));
 }
 
 bool fits(const RowMatrix& matrix, const RowVector& right, Eigen::Index n) noexcept {

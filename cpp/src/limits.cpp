@@ -18,7 +18,7 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // Braking is planned this much weaker than it may be, so that it can make up for what rounding does on the way.
 constexpr double kBrakingReserve = 1e-10;
 constexpr double kTolerance = 1e-9;  // relative: what is beyond a limit by less is rounding
-constexpr double kSnap = 1e-12;  // [1 + rad or m], and of positions as they add up
+constexpr double kSnap = 1e-12;      // [1 + rad or m], and of positions as they add up
 constexpr int kMostEvaluations = 16;
 
 double square(double x) noexcept { return x * x; }
@@ -140,8 +140,8 @@ double slope_of(double v, double v_k, double next, double next_slope, double j) 
 // A joint with a jerk limit, or its mirror image.
 struct State {
   double v, change, next, next_slope;
-  double room;      // to the upper position limit [velocities × cycles]
-  double slack;     // of it: what is beyond by less is rounding
+  double room;   // to the upper position limit [velocities × cycles]
+  double slack;  // of it: what is beyond by less is rounding
   double velocity, acceleration, braking, jerk, recovery;
 };
 
@@ -189,8 +189,7 @@ Upper upper_bound(const State& s) noexcept {
   if (!(s.room < kInfinity)) return upper;
   // Mostly the limit is far away. From its peak v a stop takes no longer than v / A + A / j, at v/2 on average.
   const double slope = std::max(0.0, slope_at(bound)), fast = bound + 0.5 * slope * slope / j;
-  if (fast <= 0.0 ? s.room >= 0.0
-                  : bound + fast * (1.0 + slope / j + 0.5 * (fast / braking + braking / j)) <= s.room) {
+  if (fast <= 0.0 ? s.room >= 0.0 : bound + fast * (1.0 + slope / j + 0.5 * (fast / braking + braking / j)) <= s.room) {
     return upper;
   }
   const auto farthest = [&](double v) { return v + rise(v, slope_at(v), j, braking) - s.room; };
@@ -243,8 +242,8 @@ LimitTracker::LimitTracker(const JointLimits& limits, const LimitOptions& option
     require(values->size() == n_, what, " has ", values->size(), " entries, lower ", n_);
   }
   for (int i = 0; i < n_; ++i) {
-    require(limits.lower[i] <= limits.upper[i], "joint ", i, ": lower = ", limits.lower[i], " is not below upper = ",
-            limits.upper[i]);
+    require(limits.lower[i] <= limits.upper[i], "joint ", i, ": lower = ", limits.lower[i],
+            " is not below upper = ", limits.upper[i]);
     for (const auto& [what, values] : positive) {
       require((*values)[i] > 0.0, "joint ", i, ": ", what, " limit must be above 0, got ", (*values)[i]);
     }
@@ -289,7 +288,8 @@ void LimitTracker::clear() noexcept {
 
 void LimitTracker::continue_from(const LimitTracker& other) {
   require(other.n_ == n_, "the other tracker has ", other.n_, " joints, this one ", n_);
-  require(other.options_.dt == options_.dt, "the other tracker has dt = ", other.options_.dt, " s, this one ", options_.dt);
+  require(other.options_.dt == options_.dt, "the other tracker has dt = ", other.options_.dt, " s, this one ",
+          options_.dt);
   if (other.q_.size() == 0) return;
   clear();
   q_ = other.q_;
@@ -325,7 +325,8 @@ bool LimitTracker::move(JointVector& qdot) noexcept {
   Block asked = Block::Zero();
   for (int i = 0; i < n_; ++i) asked[i] = qdot[i];
   Eigen::Map<Block> q(q_.data()), last(v_.data());
-  const Block v = asked.max(Eigen::Map<const Block>(bounds_.lower.data())).min(Eigen::Map<const Block>(bounds_.upper.data()));
+  const Block v = asked.max(Eigen::Map<const Block>(bounds_.lower.data()))
+                      .min(Eigen::Map<const Block>(bounds_.upper.data()));
   const bool changed = (v != asked).any();
   if (changed) {
     for (int i = 0; i < n_; ++i) qdot[i] = v[i];
@@ -391,8 +392,8 @@ void LimitTracker::update() noexcept {
   recovering_ |= outside_;
 }
 
-// The velocity from which a joint without a jerk limit can just stop before a position limit that is `room` away; the one
-// that takes it back to the limit, where that is behind it.
+// The velocity from which a joint without a jerk limit can just stop before a position limit that is `room` away; the
+// one that takes it back to the limit, where that is behind it.
 double LimitTracker::towards(const Joint& joint, double room) const noexcept {
   if (room >= 0.0) return fastest_before(room, joint.braking);
   const double recovery = joint.recovery < kInfinity ? joint.recovery : std::max(-room * options_.dt, 1e-3) / 0.1;
@@ -468,10 +469,10 @@ void LimitTracker::bound_with_jerk(int i) noexcept {
   const double slack = kTolerance * (1.0 + std::abs(q_[i])) * per_dt_;
   const double outside = std::max({0.0, -above, -below}) * dt;
   const double recovery = joint.recovery < kInfinity ? joint.recovery : std::max(outside, 1e-3) / 0.1;
-  const Upper up = upper_bound({v_[i], joint.change, joint.next, joint.next_slope, above, slack,
-                                joint.velocity, joint.acceleration, joint.braking, joint.jerk, recovery});
-  const Upper down = upper_bound({-v_[i], -joint.change, -joint.next, -joint.next_slope, below,
-                                  slack, joint.velocity, joint.acceleration, joint.braking, joint.jerk, recovery});
+  const Upper up = upper_bound({v_[i], joint.change, joint.next, joint.next_slope, above, slack, joint.velocity,
+                                joint.acceleration, joint.braking, joint.jerk, recovery});
+  const Upper down = upper_bound({-v_[i], -joint.change, -joint.next, -joint.next_slope, below, slack, joint.velocity,
+                                  joint.acceleration, joint.braking, joint.jerk, recovery});
   // The way back from one limit does not break another.
   double upper = std::max(up.bound, -down.safe), lower = std::min(-down.bound, up.safe);
   if (lower > upper) lower = upper = above < 0.0 ? upper : below < 0.0 ? lower : joint.next;

@@ -40,8 +40,8 @@ Eigen::Vector3d rotation_exp_rate(const Eigen::Vector3d& vector, const Eigen::Ve
   const bool small = angle < 1e-2;
   const double sine = std::sin(0.5 * angle);
   const double a = small ? 0.5 - square / 24.0 + square * square / 720.0 : 2.0 * sine * sine / square;
-  const double b =
-      small ? 1.0 / 6.0 - square / 120.0 + square * square / 5040.0 : (angle - std::sin(angle)) / (square * angle);
+  const double b = small ? 1.0 / 6.0 - square / 120.0 + square * square / 5040.0
+                         : (angle - std::sin(angle)) / (square * angle);
   const Eigen::Vector3d once = vector.cross(rate);
   return rate + a * once + b * vector.cross(once);
 }

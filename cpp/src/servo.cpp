@@ -68,13 +68,15 @@ bool inside(const JointVector& qdot, const VelocityBounds& bounds) noexcept {
   return true;
 }
 
-// from + s (to − from) for the largest s in [0, 1] for which it is inside the bounds; where none is, for the largest for
-// which it is nearest to them. Sets the bits of the joints that decide it.
+// from + s (to − from) for the largest s in [0, 1] for which it is inside the bounds; where none is, for the largest
+// for which it is nearest to them. Sets the bits of the joints that decide it.
 JointVector furthest(const JointVector& from, const JointVector& to, const VelocityBounds& bounds,
                      std::uint16_t& limiting) noexcept {
   const auto n = from.size();
   const JointVector way = to - from;
-  const auto moves = [&](Eigen::Index i) { return std::abs(way[i]) > 1e-12 * std::abs(from[i]); };  // more than rounding
+  const auto moves = [&](Eigen::Index i) {
+    return std::abs(way[i]) > 1e-12 * std::abs(from[i]);
+  };  // more than rounding
   double least = 0.0, s = 1.0;
   for (Eigen::Index i = 0; i < n; ++i) {
     if (!moves(i)) continue;
@@ -320,8 +322,7 @@ JointVector Servo::redistribute(const JointVector& qdot, const VelocityBounds& b
     const double w = weight(exact_spectrum_.sigma(i), exact_spectrum_.sigma(0), regular);
     first += w * exact_spectrum_.u(i) * exact_spectrum_.v(i).transpose();
   }
-  const JointVector begin =
-      nearest(qdot, first, first.lazyProduct(qdot), exact_spectrum_.sigma(0), qdot, bounds, step);
+  const JointVector begin = nearest(qdot, first, first.lazyProduct(qdot), exact_spectrum_.sigma(0), qdot, bounds, step);
 
   // Then all the rest, while that stays.
   rows_.setZero(spectrum.rows(), chain_.dof());
@@ -344,8 +345,8 @@ JointVector Servo::redistribute(const JointVector& qdot, const VelocityBounds& b
 // Inside the bounds, min |rows q̇ − goal|² + λ² |q̇ − begin|², and again from there.
 JointVector Servo::nearest(const JointVector& begin, const TaskJacobian& rows, const TaskVector& goal, double largest,
                            const JointVector& asked, const VelocityBounds& bounds, ServoStep& step) noexcept {
-  // For q̇ + x, and slack s that stands for the twist still missed: min |x|² + |s|², M x + λ s = missed, in one level, and
-  // without squaring M.
+  // For q̇ + x, and slack s that stands for the twist still missed: min |x|² + |s|², M x + λ s = missed, in one level,
+  // and without squaring M.
   const auto m = rows.rows(), n = rows.cols();
   problem_.C.setZero(m, n + m);
   problem_.C.leftCols(n) = rows;

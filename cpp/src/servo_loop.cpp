@@ -23,7 +23,8 @@ constexpr unsigned kFresh = 4;
 constexpr double kLongestStop = 1.0;  // [s]
 
 std::int64_t now() noexcept {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch()).count();
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch())
+      .count();
 }
 
 // [ns] from now on.
@@ -37,8 +38,8 @@ std::int64_t deadline(double timeout) {
 ServoLoop::ServoLoop(Servo servo, Sink sink, const ServoLoopOptions& options)
     : dt_(servo.options().dt), dof_(servo.chain().dof()), sink_(std::move(sink)), options_(options) {
   require(servo.q().size() != 0, "the servo has no start: call reset(q) first");
-  require(options.history >= 2 && std::has_single_bit(static_cast<unsigned>(options.history)), "history = ",
-          options.history, " must be a power of 2, and at least 2");
+  require(options.history >= 2 && std::has_single_bit(static_cast<unsigned>(options.history)),
+          "history = ", options.history, " must be a power of 2, and at least 2");
   require(options.priority >= 0 && options.priority <= 99, "priority = ", options.priority, " must be from 0 to 99");
   samples_.resize(static_cast<std::size_t>(options.history));
   driver_ = new Driver{std::move(servo)};
@@ -66,7 +67,8 @@ void ServoLoop::start() {
   if (error == 0) return;
   stopping_ = true;
   thread_.join();
-  throw Error(detail::message("the system refuses SCHED_FIFO with priority ", options_.priority, ": ", std::strerror(error)));
+  throw Error(
+      detail::message("the system refuses SCHED_FIFO with priority ", options_.priority, ": ", std::strerror(error)));
 }
 
 void ServoLoop::stop() noexcept {
@@ -146,21 +148,17 @@ LoopSample ServoLoop::cycle(bool stopping) noexcept {
   const Command& command = latest();
   sample.time = 1e-9 * static_cast<double>(since_start());
   sample.cycle = cycles_.load(std::memory_order_relaxed);
-  sample.command = stopping                                                          ? LoopCommand::Hold
+  sample.command = stopping                                                         ? LoopCommand::Hold
                    : command.kind == LoopCommand::Hold || now() <= command.deadline ? command.kind
-                                                                                     : LoopCommand::Stale;
+                                                                                    : LoopCommand::Stale;
   switch (sample.command) {
     case LoopCommand::FollowPose:
       sample.step = servo.update(command.target);
       sample.target = command.target;
       break;
-    case LoopCommand::FollowTwist:
-      sample.step = servo.update_twist(command.twist);
-      break;
+    case LoopCommand::FollowTwist: sample.step = servo.update_twist(command.twist); break;
     case LoopCommand::Hold:
-    case LoopCommand::Stale:
-      sample.step = servo.hold();
-      break;
+    case LoopCommand::Stale: sample.step = servo.hold(); break;
   }
   sample.tip = servo.tip();
   if (sample.command != LoopCommand::FollowPose) sample.target = sample.tip;

@@ -1,9 +1,10 @@
 #pragma once
 // What is known of each arm: one description, from which values, derivatives, expressions and texts come.
 //
-// `residuals` and `minors` are templates over the scalar: x.s(q4), x.c(q4) are sin and cos of the chain's fourth joint. The
-// squares of the minors add up to m² = det(JJᵀ). The Comau's come from its spherical wrist. Both seven-joint arms have axes
-// 1 to 3 through the shoulder: about that point m² is a sum over 3×3 minors of the moments of axes 4 to 7 (Cauchy-Binet).
+// `residuals` and `minors` are templates over the scalar: x.s(q4), x.c(q4) are sin and cos of the chain's fourth joint.
+// The squares of the minors add up to m² = det(JJᵀ). The Comau's come from its spherical wrist. Both seven-joint arms
+// have axes 1 to 3 through the shoulder: about that point m² is a sum over 3×3 minors of the moments of axes 4 to 7
+// (Cauchy-Binet).
 
 #include <array>
 #include <tuple>
@@ -25,9 +26,10 @@ struct ComauRacer {
   static constexpr int kDof = 6, kSets = 3;
   static constexpr std::array<int, kSets> kCodimension{1, 1, 1};
   static std::array<SingularSet, kSets> sets() {
-    return {{{"wrist", "sin q5 = 0", 1, {4}},
-             {"elbow", "sin(q3 + 0.1878184) = 0: shoulder, elbow and wrist in line", 1, {2}},
-             {"shoulder", "0.15 + 0.59 sin q2 - 0.13 cos(q3 - q2) - 0.684 sin(q3 - q2) = 0: wrist on axis 1", 1, {1, 2}}}};
+    return {
+        {{"wrist", "sin q5 = 0", 1, {4}},
+         {"elbow", "sin(q3 + 0.1878184) = 0: shoulder, elbow and wrist in line", 1, {2}},
+         {"shoulder", "0.15 + 0.59 sin q2 - 0.13 cos(q3 - q2) - 0.684 sin(q3 - q2) = 0: wrist on axis 1", 1, {1, 2}}}};
   }
   static constexpr double a1 = 0.15, a2 = 0.59, a3 = 0.13, d4 = 0.684;
   static constexpr double l = 0.6962442100297855;  // √(a3² + d4²)
@@ -60,8 +62,8 @@ struct PandaLengths {
   static constexpr double twist5 = 1.0;
 };
 
-// Of axis 5: P its distance from the shoulder; (−C, A) the wrist as the shoulder sees it; K is zero where shoulder, elbow
-// and wrist are in line; F, with cos q5, where the moments of axes 4, 6 and 7 lie in a plane.
+// Of axis 5: P its distance from the shoulder; (−C, A) the wrist as the shoulder sees it; K is zero where shoulder,
+// elbow and wrist are in line; F, with cos q5, where the moments of axes 4, 6 and 7 lie in a plane.
 template <typename L, typename X>
 struct SevenJoints {
   using Elbow = decltype(1.0 * std::declval<X>().s(q4) + 1.0 * std::declval<X>().c(q4));
@@ -117,7 +119,10 @@ struct Panda {
   static constexpr std::array<int, kSets> kCodimension{2, 2, 2, 2};
   static std::array<SingularSet, kSets> sets() {
     return {{{"wrist", "cos q5 = 0 and K(q4) sin q6 + 0.088 (0.316 sin q4 + 0.0825 cos q4) = 0", 2, {3, 4, 5}},
-             {"elbow", "sin q5 = 0 and K(q4) = 0.12827 sin(q4 + 0.467002) = 0: shoulder, elbow and wrist in line", 2, {3, 4}},
+             {"elbow",
+              "sin q5 = 0 and K(q4) = 0.12827 sin(q4 + 0.467002) = 0: shoulder, elbow and wrist in line",
+              2,
+              {3, 4}},
              {"shoulder", "sin q2 = 0 and g(q3, q4, q5, q6) = 0", 2, {1, 2, 3, 4, 5}},
              {"shoulder-wrist", "q4 = 0 and sin q6 = -0.12571: shoulder on axes 5 and 7", 2, {3, 5}}}};
   }

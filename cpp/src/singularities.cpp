@@ -69,7 +69,8 @@ struct Kernels {
   static constexpr std::array<int, kResiduals> kSet = [] {
     std::array<int, kResiduals> out{};
     for (int set = 0, at = 0; set < Arm::kSets; ++set) {
-      for (int j = 0; j < Arm::kCodimension[static_cast<std::size_t>(set)]; ++j) out[static_cast<std::size_t>(at++)] = set;
+      for (int j = 0; j < Arm::kCodimension[static_cast<std::size_t>(set)]; ++j)
+        out[static_cast<std::size_t>(at++)] = set;
     }
     return out;
   }();
@@ -147,9 +148,8 @@ struct Kernels {
     const SinCos x = SinCos::of<lanes>(q, n);
     const auto r = Arm::residuals(Jets<order>{x.sine, x.cosine});
     double psi[kMaxSets] = {}, phi[kMaxSets];
-    for_each(r, [&](auto k, const auto& jet) __attribute__((always_inline)) {
-      psi[kSet[static_cast<std::size_t>(k())]] += jet.v * jet.v;
-    });
+    for_each(r, [&](auto k, const auto& jet)
+                    __attribute__((always_inline)) { psi[kSet[static_cast<std::size_t>(k())]] += jet.v * jet.v; });
     const double sum = potentials(psi, p, phi);
     clear<order>(gradient, hessian);
     double slopes[Arm::kSets][n] = {};  // ∇ψ_i
@@ -234,27 +234,27 @@ struct Entries {
 };
 
 // One function a kernel and width: the attribute lets the compiler use the processor's vectors in what it inlines.
-#define SIGMAIK_ENTRIES(NAME, LANES, ATTRIBUTES)                                                                         \
-  template <typename Arm>                                                                                                \
-  struct NAME {                                                                                                          \
-    using K = Kernels<Arm, LANES>;                                                                                       \
-    ATTRIBUTES static void residuals(const double* q, double* r) { K::residuals(q, r); }                                 \
-    ATTRIBUTES static double psi(int i, const double* q, double* g, double* h) { return K::psi(i, q, g, h); }            \
-    ATTRIBUTES static double value(const double* q, const Potential& p) { return K::potential(q, p); }                   \
-    ATTRIBUTES static double gradient(const double* q, const Potential& p, double* g) {                                  \
-      return K::template potential<1>(q, p, g, nullptr);                                                                 \
-    }                                                                                                                    \
-    ATTRIBUTES static double hessian(const double* q, const Potential& p, double* g, double* h) {                        \
-      return K::template potential<2>(q, p, g, h);                                                                       \
-    }                                                                                                                    \
-    ATTRIBUTES static double m(const double* q) { return K::manipulability(q); }                                         \
-    ATTRIBUTES static double m_gradient(const double* q, double* g) {                                                    \
-      return K::template manipulability<1>(q, g, nullptr);                                                               \
-    }                                                                                                                    \
-    ATTRIBUTES static double m_hessian(const double* q, double* g, double* h) {                                          \
-      return K::template manipulability<2>(q, g, h);                                                                     \
-    }                                                                                                                    \
-    static constexpr Entries<Arm> all{residuals, psi, value, gradient, hessian, m, m_gradient, m_hessian};               \
+#define SIGMAIK_ENTRIES(NAME, LANES, ATTRIBUTES)                                                              \
+  template <typename Arm>                                                                                     \
+  struct NAME {                                                                                               \
+    using K = Kernels<Arm, LANES>;                                                                            \
+    ATTRIBUTES static void residuals(const double* q, double* r) { K::residuals(q, r); }                      \
+    ATTRIBUTES static double psi(int i, const double* q, double* g, double* h) { return K::psi(i, q, g, h); } \
+    ATTRIBUTES static double value(const double* q, const Potential& p) { return K::potential(q, p); }        \
+    ATTRIBUTES static double gradient(const double* q, const Potential& p, double* g) {                       \
+      return K::template potential<1>(q, p, g, nullptr);                                                      \
+    }                                                                                                         \
+    ATTRIBUTES static double hessian(const double* q, const Potential& p, double* g, double* h) {             \
+      return K::template potential<2>(q, p, g, h);                                                            \
+    }                                                                                                         \
+    ATTRIBUTES static double m(const double* q) { return K::manipulability(q); }                              \
+    ATTRIBUTES static double m_gradient(const double* q, double* g) {                                         \
+      return K::template manipulability<1>(q, g, nullptr);                                                    \
+    }                                                                                                         \
+    ATTRIBUTES static double m_hessian(const double* q, double* g, double* h) {                               \
+      return K::template manipulability<2>(q, g, h);                                                          \
+    }                                                                                                         \
+    static constexpr Entries<Arm> all{residuals, psi, value, gradient, hessian, m, m_gradient, m_hessian};    \
   }
 
 SIGMAIK_ENTRIES(Baseline, 2, );
@@ -333,8 +333,8 @@ const std::vector<const SingularSets::Model*>& models() {
   return all;
 }
 
-// Whether two chains' axes move alike, whatever stands before the first and behind the last: for every pair of axes, the
-// cosine of their angle and the product of their screws are the same, in three postures.
+// Whether two chains' axes move alike, whatever stands before the first and behind the last: for every pair of axes,
+// the cosine of their angle and the product of their screws are the same, in three postures.
 bool same_axes(const Chain& a, const Chain& b) {
   if (a.joint_types() != b.joint_types() || a.dof() != b.dof()) return false;
   const int n = a.dof();

@@ -26,9 +26,8 @@ int run_baseline(JacobiWork<length>& work, int k, const double* a, std::ptrdiff_
 
 #if defined(__x86_64__) && !defined(SIGMAIK_NO_DISPATCH)
 template <int length>
-__attribute__((target("avx2,fma"))) int run_avx2(JacobiWork<length>& work, int k, const double* a,
-                                                 std::ptrdiff_t inner, std::ptrdiff_t outer, int count,
-                                                 double factor) noexcept {
+__attribute__((target("avx2,fma"))) int run_avx2(JacobiWork<length>& work, int k, const double* a, std::ptrdiff_t inner,
+                                                 std::ptrdiff_t outer, int count, double factor) noexcept {
   return detail::jacobi<4>(work, k, a, inner, outer, count, factor, kMaxSweeps);
 }
 

@@ -9,9 +9,9 @@
 namespace sigmaik {
 namespace {
 
+using detail::require;
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
-using detail::require;
 
 constexpr double kFarthest = 1e9;  // [m]: differences, and their squares, stay finite
 constexpr double kSigmas = 4.0;    // of the noise of two samples: not yet motion
@@ -31,7 +31,8 @@ void bound(Twist& twist, const TargetStreamOptions& options) noexcept {
 }
 
 // p(u) on [0, 1] from 0 to `end` with slopes a and b there, and its derivative in u.
-void hermite(const Vector3d& end, const Vector3d& a, const Vector3d& b, double u, Vector3d& p, Vector3d& slope) noexcept {
+void hermite(const Vector3d& end, const Vector3d& a, const Vector3d& b, double u, Vector3d& p,
+             Vector3d& slope) noexcept {
   const double v = 1.0 - u;
   p = u * u * (3.0 - 2.0 * u) * end + u * v * v * a - u * u * v * b;
   slope = 6.0 * u * v * end + v * (1.0 - 3.0 * u) * a + u * (3.0 * u - 2.0) * b;
@@ -198,8 +199,8 @@ void TargetStream::correct(const Sample& next) noexcept {
 
 // Motion -------------------------------------------------------------------------------------------------------------
 
-// At sample i, of the parabola through it and its neighbours: each side's mean twist counts by the other side's time. The
-// first, which is played after a start only, is left from rest.
+// At sample i, of the parabola through it and its neighbours: each side's mean twist counts by the other side's time.
+// The first, which is played after a start only, is left from rest.
 Twist TargetStream::slope(int i) const noexcept {
   if (i == 0) return Twist::Zero();
   const double before = sample(i).time - sample(i - 1).time;

@@ -28,8 +28,7 @@ int Task::rows() const noexcept { return static_cast<int>(std::count(mask.begin(
 
 void Task::validate() const { detail::require(rows() > 0, "the task's mask asks for no row at all"); }
 
-TaskJacobian select_rows(const Task& task, const Eigen::Matrix3d& rotation,
-                         const Jacobian& rows) noexcept {
+TaskJacobian select_rows(const Task& task, const Eigen::Matrix3d& rotation, const Jacobian& rows) noexcept {
   TaskJacobian out(task.rows(), rows.cols());
   select(task, rotation, rows, out);
   return out;

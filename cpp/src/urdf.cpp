@@ -120,7 +120,8 @@ Source read(const std::string& source) {
 void refuse_xacro(const XMLElement& element) {
   const std::string_view name = element.Name();
   if (name.starts_with("xacro:")) {
-    fail("line ", element.GetLineNum(), ": <", name, "> is xacro, not URDF; run it through xacro first: xacro "
+    fail("line ", element.GetLineNum(), ": <", name,
+         "> is xacro, not URDF; run it through xacro first: xacro "
          "arm.urdf.xacro > arm.urdf");
   }
   // tinyxml2 refuses deep nesting, so the recursion is bounded.
@@ -166,8 +167,7 @@ const XMLElement* only_child(const std::string& owner, const XMLElement& parent,
 
 std::string name_of(const XMLElement& element) {
   const char* const name = element.Attribute("name");
-  require(name != nullptr && *name != '\0', "line ", element.GetLineNum(), ": a <", element.Name(),
-          "> without a name");
+  require(name != nullptr && *name != '\0', "line ", element.GetLineNum(), ": a <", element.Name(), "> without a name");
   for (std::string_view rest = name; !rest.empty(); rest.remove_prefix(utf8_length(rest))) {
     require(utf8_length(rest) > 0, "line ", element.GetLineNum(), ": the name of a <", element.Name(),
             "> is not UTF-8");
@@ -309,8 +309,8 @@ std::vector<double> numbers(const std::string& owner, const XMLElement& element,
     p = next;
   }
   if (!ok || values.size() != count) {
-    fail(owner, ": <", element.Name(), " ", attribute, "=\"", shortened(text), "\">: ",
-         count == 1 ? "one finite number is" : "three finite numbers are", " needed",
+    fail(owner, ": <", element.Name(), " ", attribute, "=\"", shortened(text),
+         "\">: ", count == 1 ? "one finite number is" : "three finite numbers are", " needed",
          std::strchr(text, '$') != nullptr ? "; an expression of xacro's? run the file through xacro first" : "");
   }
   return values;
@@ -336,9 +336,8 @@ Pose origin(const std::string& owner, const XMLElement& parent) {
   const Eigen::Vector3d rpy = vector(owner, *e, "rpy");
   const Eigen::Array3d c = rpy.array().cos(), s = rpy.array().sin();
   // Rz(yaw) Ry(pitch) Rx(roll)
-  pose.linear() << c[2] * c[1], c[2] * s[1] * s[0] - s[2] * c[0], c[2] * s[1] * c[0] + s[2] * s[0],
-                   s[2] * c[1], s[2] * s[1] * s[0] + c[2] * c[0], s[2] * s[1] * c[0] - c[2] * s[0],
-                   -s[1],       c[1] * s[0],                      c[1] * c[0];
+  pose.linear() << c[2] * c[1], c[2] * s[1] * s[0] - s[2] * c[0], c[2] * s[1] * c[0] + s[2] * s[0], s[2] * c[1],
+      s[2] * s[1] * s[0] + c[2] * c[0], s[2] * s[1] * c[0] - c[2] * s[0], -s[1], c[1] * s[0], c[1] * c[0];
   pose.translation() = vector(owner, *e, "xyz");
   return pose;
 }

@@ -61,9 +61,8 @@ Solution VelocitySolver::solve(const TaskJacobianRef& jacobian, const TaskRef& t
   const int asked = task_.rows();
   const bool select = m == 6 && !(asked == 6 && task_.frame == Frame::Base);
   if (m < 1 || m > kMaxTask || n < 1 || n > kMaxJoints || twist.size() != m ||
-      (posture.size() != 0 && posture.size() != n) || (m != 6 && asked != 6 && m != asked) ||
-      !finite(jacobian) || !finite(twist) || !finite(posture) ||
-      (select && task_.frame == Frame::Tool && !rotation.allFinite())) {
+      (posture.size() != 0 && posture.size() != n) || (m != 6 && asked != 6 && m != asked) || !finite(jacobian) ||
+      !finite(twist) || !finite(posture) || (select && task_.frame == Frame::Tool && !rotation.allFinite())) {
     return refuse(jacobian);
   }
 

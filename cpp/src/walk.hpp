@@ -31,8 +31,8 @@ struct FrameColumns {
   }
 };
 
-// Walks from the base to the last joint, whose frame is returned. `joint(i, frame)` sees every joint's frame, whose z is
-// its axis.
+// Walks from the base to the last joint, whose frame is returned. `joint(i, frame)` sees every joint's frame, whose z
+// is its axis.
 template <typename Visit>
 FrameColumns walk(const Chain& chain, const JointRef& q, Visit joint) noexcept {
   const JointConstants* constants = chain.constants().data();

@@ -1,4 +1,5 @@
-"""Position only, or any rotation about the tool's axis: fewer task rows, more freedom. The same as 03_position_only.cpp."""
+"""Position only, or any rotation about the tool's axis: fewer task rows, more freedom. The same as
+03_position_only.cpp."""
 
 import numpy as np
 

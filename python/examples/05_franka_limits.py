@@ -55,9 +55,7 @@ ratios = {
     "acceleration": np.abs(acceleration) / limits.acceleration,
     "jerk": np.abs(jerk) / limits.jerk,
 }
-violations = sum(
-    int(np.sum(~(ratio <= 1 + 1e-6))) for ratio in ratios.values()
-)  # 1e-6: rounding of the differences
+violations = sum(int(np.sum(~(ratio <= 1 + 1e-6))) for ratio in ratios.values())  # 1e-6: rounding of the differences
 limited = sum(step.status == sk.Status.LIMITED for step in steps)
 print(f"{len(steps)} cycles, {limited} limited, {violations} violations")
 print("peaks, of the limits: " + ", ".join(f"{name} {ratio.max():.4f}" for name, ratio in ratios.items()))

@@ -1,4 +1,5 @@
-"""Follows a marker that a camera sees at 30 Hz, 50 ms late, now and then wrong, until it stops. The same as 07_camera_stream.cpp."""
+"""Follows a marker that a camera sees at 30 Hz, 50 ms late, now and then wrong, until it stops. The same as
+07_camera_stream.cpp."""
 
 import math
 
@@ -36,5 +37,7 @@ for cycle in range(10000):
     if 3000 <= cycle < 8000:
         worst = max(worst, float(np.linalg.norm(servo.pose[:3, 3] - marker(now + 1e-3)[:3, 3])))
 
-print(f"{stream.counts.accepted} samples, {stream.counts.outliers} refused; at most {1e3 * worst:.1f} mm from the marker")
+print(
+    f"{stream.counts.accepted} samples, {stream.counts.outliers} refused; at most {1e3 * worst:.1f} mm from the marker"
+)
 print(f"then {target.status.name}, at {np.linalg.norm(step.qdot):.6f} rad/s")

@@ -66,20 +66,26 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"sigmaik {sk.__version__}")
     commands = parser.add_subparsers(metavar="COMMAND", required=True)
-    _add_reach(
-        commands.add_parser("reach", help="drive an arm along a path by one method or several, and compare")
-    )
+    _add_reach(commands.add_parser("reach", help="drive an arm along a path by one method or several, and compare"))
     _add_axis5(commands.add_parser("axis5", help="drive a KUKA arm by its axis-5 singularity, within limits"))
     _add_limits(commands.add_parser("limits", help="what joint limits cost, and what breaks without them"))
     add_montecarlo(
-        commands.add_parser("montecarlo", help="random motions, clear of singularities or not: what it costs and brings")
+        commands.add_parser(
+            "montecarlo", help="random motions, clear of singularities or not: what it costs and brings"
+        )
     )
     add_table(commands.add_parser("table", help="an arm round a table, with the geometry-aware index and without"))
     add_reaching(commands.add_parser("reaching", help="motions along a good geometry-aware index, and others"))
-    add_cart(commands.add_parser("cart", help="an arm on a cart by its shoulder singularity: four ways to drive the cart"))
+    add_cart(
+        commands.add_parser("cart", help="an arm on a cart by its shoulder singularity: four ways to drive the cart")
+    )
     add_teleop(commands.add_parser("teleop", help="drive an arm from a page in the browser, through its singularities"))
     add_track(commands.add_parser("track", help="a target that moves, seen by a camera: errors, delay, jerk, events"))
-    add_execute(commands.add_parser("execute", help="a time-optimal motion in physics, by computed torque and by velocity loops"))
+    add_execute(
+        commands.add_parser(
+            "execute", help="a time-optimal motion in physics, by computed torque and by velocity loops"
+        )
+    )
     robots = commands.add_parser("robots", help="list the arms that are shipped, and their paths")
     robots.set_defaults(run=_robots)
     _add_info(commands.add_parser("info", help="an arm's joints, limits, reach and singular values"))
@@ -109,9 +115,7 @@ def _add_reach(parser: argparse.ArgumentParser) -> None:
         help="a name from `sigmaik robots`, or a CSV or JSON file of waypoints: x, y, z [m], roll, pitch, "
         "yaw [rad, fixed axes], duration [s] (%(default)s)",
     )
-    arm.add_argument(
-        "--start", metavar="Q", help="joint positions to start from: home, zero, or a comma list"
-    )
+    arm.add_argument("--start", metavar="Q", help="joint positions to start from: home, zero, or a comma list")
     arm.add_argument(
         "--method",
         action="append",
@@ -147,12 +151,8 @@ def _add_reach(parser: argparse.ArgumentParser) -> None:
     add_physics_options(parser)
     out = parser.add_argument_group("what is written")
     out.add_argument("--out", default="sigmaik-reach", type=pathlib.Path, metavar="DIR", help="(%(default)s)")
-    out.add_argument(
-        "--format", choices=("npz", "csv", "none"), default="npz", help="of the time series (%(default)s)"
-    )
-    out.add_argument(
-        "--no-plot", action="store_true", help="no picture; the last line is the table's path then"
-    )
+    out.add_argument("--format", choices=("npz", "csv", "none"), default="npz", help="of the time series (%(default)s)")
+    out.add_argument("--no-plot", action="store_true", help="no picture; the last line is the table's path then")
     parser.set_defaults(run=_reach)
 
 
@@ -189,7 +189,12 @@ def _reach(arguments: argparse.Namespace) -> int:
         stem += "-gains"
     if arguments.physics:
         return reach_in_physics(
-            arguments, console, _headline(experiment), experiment, lambda run: _run_all(experiment, methods, held, run), stem
+            arguments,
+            console,
+            _headline(experiment),
+            experiment,
+            lambda run: _run_all(experiment, methods, held, run),
+            stem,
         )
     runs = _run_all(experiment, methods, held, lambda method, on, progress: ex.run(experiment, method, on, progress))
 
@@ -301,12 +306,8 @@ def _add_axis5(parser: argparse.ArgumentParser) -> None:
     solver.add_argument("--iterations", type=int, help="linearisations a sample (2)")
     out = parser.add_argument_group("what is written")
     out.add_argument("--out", default="sigmaik-axis5", type=pathlib.Path, metavar="DIR", help="(%(default)s)")
-    out.add_argument(
-        "--format", choices=("npz", "csv", "none"), default="npz", help="of the time series (%(default)s)"
-    )
-    out.add_argument(
-        "--no-plots", action="store_true", help="no pictures; the last line is the table's path then"
-    )
+    out.add_argument("--format", choices=("npz", "csv", "none"), default="npz", help="of the time series (%(default)s)")
+    out.add_argument("--no-plots", action="store_true", help="no pictures; the last line is the table's path then")
     parser.set_defaults(run=_axis5)
 
 
@@ -376,9 +377,7 @@ def _add_limits(parser: argparse.ArgumentParser) -> None:
         shown = text if value is None else f"{text} ({value:g})"
         parser.add_argument(option, type=kind, default=value, metavar=unit, help=shown)
     out = parser.add_argument_group("what is written")
-    out.add_argument(
-        "--out", default="sigmaik-limits", type=pathlib.Path, metavar="DIR", help="(%(default)s)"
-    )
+    out.add_argument("--out", default="sigmaik-limits", type=pathlib.Path, metavar="DIR", help="(%(default)s)")
     out.add_argument(
         "--format",
         choices=("npz", "none"),
@@ -395,9 +394,7 @@ def _run_limits(arguments: argparse.Namespace) -> int:
         need("matplotlib")
     names = ("seed", "rate", "trials", "seconds", "pace", "acceleration", "jerk")
     settings = ex.LimitsSettings(**{name: getattr(arguments, name) for name in names})
-    experiment = ex.load_limits(
-        arguments.robot, settings, arguments.method, base=arguments.base, tip=arguments.tip
-    )
+    experiment = ex.load_limits(arguments.robot, settings, arguments.method, base=arguments.base, tip=arguments.tip)
 
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
@@ -561,10 +558,7 @@ def _singular_sets(console: Console, chain: sk.Chain, q: Array) -> None:
 
 def _sampled_reach(chain: sk.Chain, samples: int, seed: int) -> float:
     generator = np.random.default_rng(seed)
-    return max(
-        float(np.linalg.norm(chain.pose(chain.random_configuration(generator))[:3, 3]))
-        for _ in range(samples)
-    )
+    return max(float(np.linalg.norm(chain.pose(chain.random_configuration(generator))[:3, 3])) for _ in range(samples))
 
 
 def _reach_bound(text: str, chain: sk.Chain) -> float:

@@ -24,9 +24,7 @@ def add_cart(parser: argparse.ArgumentParser) -> None:
         default="both",
         help="fk: poses of the paper's joints; paper: the paper's poses, with a tool that makes them fit (%(default)s)",
     )
-    parser.add_argument(
-        "--method", default=",".join(cart.METHODS), metavar="LIST", help="some of %(default)s"
-    )
+    parser.add_argument("--method", default=",".join(cart.METHODS), metavar="LIST", help="some of %(default)s")
     parser.add_argument(
         "--samples", type=int, default=5068, metavar="M", help="of the motion; the paper's are %(default)s"
     )

@@ -29,7 +29,10 @@ def add_montecarlo(parser: argparse.ArgumentParser) -> None:
     )
     standard = mc.Study()
     parser.add_argument(
-        "--robot", default="all", metavar="LIST", help="shipped arms; all: those whose singular sets are known (%(default)s)"
+        "--robot",
+        default="all",
+        metavar="LIST",
+        help="shipped arms; all: those whose singular sets are known (%(default)s)",
     )
     parser.add_argument("--samples", type=int, default=standard.samples, metavar="N", help="pairs (%(default)s)")
     parser.add_argument("--seed", type=int, default=standard.seed, metavar="N", help="of the pairs (%(default)s)")
@@ -50,9 +53,7 @@ def add_montecarlo(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--solver", choices=("sigmaik", "ipopt"), default=standard.solver, help="ipopt: by CasADi (%(default)s)"
     )
-    parser.add_argument(
-        "--generic", action="store_true", help="manipulability from the Jacobian, not in closed form"
-    )
+    parser.add_argument("--generic", action="store_true", help="manipulability from the Jacobian, not in closed form")
     parser.add_argument(
         "--between-nodes", action="store_true", help="keep limits of position between the nodes, as the paper does not"
     )
@@ -104,7 +105,9 @@ def _run(
     jobs: int,
 ) -> None:
     stem = f"{study.robot}-montecarlo-w{study.time_weight:g}"
-    stem += "".join(f"-{word}" for word, said in (("ipopt", study.solver == "ipopt"), ("generic", study.generic)) if said)
+    stem += "".join(
+        f"-{word}" for word, said in (("ipopt", study.solver == "ipopt"), ("generic", study.generic)) if said
+    )
     file = arguments.out / f"{stem}.csv"
 
     from rich.console import Console

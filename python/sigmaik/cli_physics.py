@@ -57,7 +57,11 @@ def add_arm_options(group: argparse._ArgumentGroup) -> None:
         "--delay", type=int, default=0, metavar="N", help="periods by which measurements are late (%(default)s)"
     )
     group.add_argument(
-        "--period", type=float, default=1e-3, metavar="S", help="of the drives' commands; physics runs twice as fast (%(default)s)"
+        "--period",
+        type=float,
+        default=1e-3,
+        metavar="S",
+        help="of the drives' commands; physics runs twice as fast (%(default)s)",
     )
     group.add_argument(
         "--frequency", type=float, default=20.0, metavar="RAD/S", help="of the computed torque (%(default)g)"
@@ -96,7 +100,8 @@ def reach_in_physics(
     run_all: Callable[[Callable[[ex.NamedMethod, bool, Callable[[int], None]], PhysicsRun]], list[PhysicsRun]],
     stem: str,
 ) -> int:
-    """What `sigmaik reach --physics` does once its options are read. run_all: calls for every method and speed limits."""
+    """What `sigmaik reach --physics` does once its options are read. run_all: calls for every method and speed
+    limits."""
     need("mujoco", "sim")
     from .experiments import physics
     from .experiments.physics_table import physics_table

@@ -58,7 +58,9 @@ def _reaching(arguments: argparse.Namespace) -> int:
             bar = progress.add_task(robot, total=arguments.tasks)
             for number in range(arguments.tasks):
                 chain, start, goal = rc.task(robot, arguments.seed, number)
-                runs += [rc.solve_task(chain, start, goal, method, arguments.seed + number, planning) for method in methods]
+                runs += [
+                    rc.solve_task(chain, start, goal, method, arguments.seed + number, planning) for method in methods
+                ]
                 progress.advance(bar)
         summaries = rc.summarize_runs(runs)
         table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0))

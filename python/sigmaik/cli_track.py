@@ -58,11 +58,12 @@ def add_track(parser: argparse.ArgumentParser) -> None:
         "and pose (M, 4, 4) (%(default)s)",
     )
     arm.add_argument(
-        "--method", action="append", metavar="NAME[:PARAMETER=VALUE,…]", help="may be repeated; a comma list, or all (all)"
+        "--method",
+        action="append",
+        metavar="NAME[:PARAMETER=VALUE,…]",
+        help="may be repeated; a comma list, or all (all)",
     )
-    arm.add_argument(
-        "--mode", default="predict,interpolate,hold,raw,true", metavar="LIST", help="some of %(default)s"
-    )
+    arm.add_argument("--mode", default="predict,interpolate,hold,raw,true", metavar="LIST", help="some of %(default)s")
     arm.add_argument(
         "--feedforward", choices=("on", "off", "both"), default="both", help="of the target's twist (%(default)s)"
     )
@@ -75,7 +76,9 @@ def add_track(parser: argparse.ArgumentParser) -> None:
         for option, name, unit, text in options:
             value = getattr(defaults, name)
             shown = "" if value is None else " (%(default)s)"
-            group.add_argument(option, dest=f"track_{name}_{title[4:]}", type=float, default=value, metavar=unit, help=text + shown)
+            group.add_argument(
+                option, dest=f"track_{name}_{title[4:]}", type=float, default=value, metavar=unit, help=text + shown
+            )
         if title == "the camera":
             group.add_argument("--no-gap", action="store_true", help="the stream does not stop")
     out = parser.add_argument_group("what is written")
@@ -101,9 +104,7 @@ def _track(arguments: argparse.Namespace) -> int:
         if mode not in track.MODES:
             raise ValueError(f"no mode '{mode}'; there are {', '.join(track.MODES)}")
     methods = parse_methods(arguments.method or ["all"], Settings(rate=settings.rate))
-    experiment = track.load_track(
-        arguments.robot, arguments.target, settings, camera, arguments.base, arguments.tip
-    )
+    experiment = track.load_track(arguments.robot, arguments.target, settings, camera, arguments.base, arguments.tip)
 
     choices = {"on": [True], "off": [False], "both": [True, False]}[arguments.feedforward]
 
@@ -115,7 +116,9 @@ def _track(arguments: argparse.Namespace) -> int:
     variants = list(dict.fromkeys(by_mode + by_method))
     runs = _run_all(experiment, variants)
     twins = [dataclasses.replace(v, outliers=False) for v in by_mode if v.mode != "true"] if camera.outliers else []
-    without = dict(zip((dataclasses.replace(v, outliers=True) for v in twins), _run_all(experiment, twins), strict=True))
+    without = dict(
+        zip((dataclasses.replace(v, outliers=True) for v in twins), _run_all(experiment, twins), strict=True)
+    )
     rows = {v: track.summarize_track(run, without.get(v)) for v, run in zip(variants, runs, strict=True)}
     run_of = dict(zip(variants, runs, strict=True))
 
@@ -146,7 +149,9 @@ def _track(arguments: argparse.Namespace) -> int:
         print(f"table: {last}")
         figures = {
             "rules": plots_track.time_figure([run_of[v] for v in by_method], by="method"),
-            "modes": plots_track.time_figure([run_of[v] for v in by_mode if v.feedforward == feeds(v.mode)[0]], by="mode"),
+            "modes": plots_track.time_figure(
+                [run_of[v] for v in by_mode if v.feedforward == feeds(v.mode)[0]], by="mode"
+            ),
             "path": plots_track.path_figure(run_of[by_mode[0]]),
         }
         if camera.outliers or not arguments.no_gap:

@@ -1,4 +1,5 @@
-"""Figures of experiments, in the style of the J-PARSE paper's, and of planned motions. Needs matplotlib, of the extra "plot".
+"""Figures of experiments, in the style of the J-PARSE paper's, and of planned motions. Needs matplotlib, of the extra
+"plot".
 
 Nothing here needs a display, and pyplot's global state is left alone.
 """
@@ -217,9 +218,7 @@ def limits_figure(traces: Sequence[Trace], seconds: tuple[float, float] | None =
         grid[2][column].set_xlabel("time [s]", fontsize=9)
         _tool_path(grid[3][column], trace, here, (x, y))
     handles, labels = grid[1][0].get_legend_handles_labels()
-    figure.legend(
-        handles, labels, loc="outside lower center", ncols=max(1, len(labels)), frameon=False, fontsize=9
-    )
+    figure.legend(handles, labels, loc="outside lower center", ncols=max(1, len(labels)), frameon=False, fontsize=9)
     note = "● start  □ end" + ("  grey: target" if trial.by_pose else "")
     grid[3][0].text(0.0, 1.02, note, transform=grid[3][0].transAxes, va="bottom", fontsize=8, color="0.35")
     return figure
@@ -240,11 +239,12 @@ _STEP_SAMPLES = 10  # drawn between two samples of a trajectory
 
 
 def trajectory_figure(trajectory: Trajectory, chain: Chain | None = None) -> Figure:
-    """Positions, speeds and accelerations of all joints over time, between the trajectory's samples too, a line per joint.
+    """Positions, speeds and accelerations of all joints over time, between the trajectory's samples too, a line per
+    joint.
 
-    With a chain they are parts of its limits, ±1, the middle of a position's range being 0; a joint without the limit is
-    named and not drawn, and where no joint has one the unit is the joint's. Below are σ_min and manipulability √det(JJᵀ)
-    along the way, with what the trajectory knows of singular sets that it crosses.
+    With a chain they are parts of its limits, ±1, the middle of a position's range being 0; a joint without the limit
+    is named and not drawn, and where no joint has one the unit is the joint's. Below are σ_min and manipulability
+    √det(JJᵀ) along the way, with what the trajectory knows of singular sets that it crosses.
 
     ValueError where the trajectory is empty or the chain has other joints.
     """
@@ -284,7 +284,9 @@ def trajectory_figure(trajectory: Trajectory, chain: Chain | None = None) -> Fig
             axes.set_ylabel(f"joint {what}\n[{' or '.join(unit + per for unit in units)}]")
             axes.grid(True, color="0.9", linewidth=0.6)
         for joint in np.flatnonzero(known) if scaled else range(n):
-            axes.plot(t, values[:, joint], label=names[joint], drawstyle=style, linewidth=1.2, **_joint_style(int(joint)))
+            axes.plot(
+                t, values[:, joint], label=names[joint], drawstyle=style, linewidth=1.2, **_joint_style(int(joint))
+            )
         if scaled and not known.all():
             missing = ", ".join(names[joint] for joint in np.flatnonzero(~known))
             axes.set_title(f"without limit, not drawn: {missing}", fontsize=8, color="0.35", loc="right")
@@ -318,7 +320,9 @@ def trajectory_figure(trajectory: Trajectory, chain: Chain | None = None) -> Fig
     panels[-1].set_xlabel("time [s]")
     if t[-1] > t[0]:
         panels[-1].set_xlim(t[0], t[-1])
-    shown = {label: handle for axes in panels[:3] for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)}
+    shown = {
+        label: handle for axes in panels[:3] for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
+    }
     figure.legend(
         [shown[name] for name in names if name in shown],
         [name for name in names if name in shown],
@@ -368,11 +372,7 @@ def save_figure(figure: Figure, file: str | pathlib.Path, dpi: int = 110) -> pat
     buffer.seek(0)
 
     def write(stream: BinaryIO) -> None:
-        image = (
-            Image.open(buffer)
-            .convert("RGB")
-            .quantize(256, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
-        )
+        image = Image.open(buffer).convert("RGB").quantize(256, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
         image.save(stream, format="PNG", optimize=True)
 
     return write_atomically(pathlib.Path(file), write)

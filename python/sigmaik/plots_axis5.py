@@ -83,9 +83,7 @@ def error_figure(tracks: Sequence[Track]) -> Figure:
         for axis in range(3):
             panels[0].plot(track.t, angles[:, axis], color=shades[axis], linewidth=1.2, label=names[axis])
             panels[1].plot(track.t, change[:, axis], color=shades[axis], linewidth=1.0)
-        panels[0].plot(
-            track.t, np.degrees(track.orientation_error), color="0.25", linewidth=1.0, label="angle"
-        )
+        panels[0].plot(track.t, np.degrees(track.orientation_error), color="0.25", linewidth=1.0, label="angle")
         panels[2].plot(track.t, np.maximum(1e6 * track.position_error, 1e-7), color="0.25", linewidth=1.0)
         panels[2].set_yscale("log")
         panels[2].set_ylim(1e-7, 1e1)
@@ -204,9 +202,7 @@ def _limit(axes: Axes, limit: float, curves: Sequence[Array]) -> None:
 
 def _note(axes: Axes, text: str, colour: str) -> None:
     box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.0}
-    axes.text(
-        0.99, 0.985, text, transform=axes.transAxes, ha="right", va="top", fontsize=8, color=colour, bbox=box
-    )
+    axes.text(0.99, 0.985, text, transform=axes.transAxes, ha="right", va="top", fontsize=8, color=colour, bbox=box)
 
 
 def _panel_title(axes: Axes, text: str) -> None:

@@ -22,7 +22,10 @@ _LAW = "#D55E00"
 
 
 def laws_figure(
-    e: CartExperiment, runs: Sequence[CartRun], linear: Sequence[tuple[int, Array]], admissible: Sequence[tuple[int, Array]]
+    e: CartExperiment,
+    runs: Sequence[CartRun],
+    linear: Sequence[tuple[int, Array]],
+    admissible: Sequence[tuple[int, Array]],
 ) -> Figure:
     """Cart over time beside the forbidden region: the paper's figures 3, 4, 5 and 9, and the exact law.
 
@@ -44,7 +47,11 @@ def laws_figure(
             shade = str(0.75 - 0.6 * k / max(1, len(stages) - 1))
             last = k + 1 == len(stages)
             panel.plot(
-                e.s * e.duration, x, color=_LAW if last else shade, linewidth=2.0 if last else 1.0, label=f"{iterations}"
+                e.s * e.duration,
+                x,
+                color=_LAW if last else shade,
+                linewidth=2.0 if last else 1.0,
+                label=f"{iterations}",
             )
         panel.set_title(title, fontsize=10)
         panel.legend(title="iterations", fontsize=7, title_fontsize=7, loc="lower right")
@@ -56,7 +63,11 @@ def laws_figure(
     panels[1].set_title(f"density H at t = {e.s[middle] * e.duration:.0f} s (figure 4)", fontsize=10)
     panels[1].set_xlabel("cart [m]")
 
-    places = {"exact": (panels[2], ""), "linear": (panels[3], " (figure 5b)"), "redundancy": (panels[5], " (figure 5c)")}
+    places = {
+        "exact": (panels[2], ""),
+        "linear": (panels[3], " (figure 5b)"),
+        "redundancy": (panels[5], " (figure 5c)"),
+    }
     places |= {"gradient": (panels[6], ""), "gradient-admissible": (panels[7], "")}
     for method, (panel, note) in places.items():
         if method not in laws:

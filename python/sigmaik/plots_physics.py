@@ -27,7 +27,9 @@ def physics_figure(runs: Sequence[PhysicsRun]) -> Figure:
     first = runs[0].kinematic
     experiment = first.experiment
     columns = sorted({run.kinematic.velocity_limits for run in runs})
-    panels: tuple[tuple[str, Callable[[PhysicsRun], Array], Callable[[PhysicsRun], Array] | None, float, float], ...] = (
+    panels: tuple[
+        tuple[str, Callable[[PhysicsRun], Array], Callable[[PhysicsRun], Array] | None, float, float], ...
+    ] = (
         (
             "position error [mm]",
             lambda r: 1e3 * r.physical.position_error,
@@ -36,7 +38,13 @@ def physics_figure(runs: Sequence[PhysicsRun]) -> Figure:
             4e3,
         ),
         ("tips apart [mm]", lambda r: 1e3 * r.tip_distance, None, 1e-2, 4e3),
-        ("largest joint\nspeed [rad/s]", lambda r: r.physical.joint_speed, lambda r: r.kinematic.joint_speed, 1e-3, 1e3),
+        (
+            "largest joint\nspeed [rad/s]",
+            lambda r: r.physical.joint_speed,
+            lambda r: r.kinematic.joint_speed,
+            1e-3,
+            1e3,
+        ),
         ("largest torque\n/ effort limit", lambda r: r.effort.max(axis=1), None, 0.0, 1.05),
     )
     figure = Figure(figsize=(6.4 * len(columns) + 0.6, 2.1 * len(panels) + 1.4), layout="constrained")
@@ -54,8 +62,17 @@ def physics_figure(runs: Sequence[PhysicsRun]) -> Figure:
                 colour, dash = styles[run.kinematic.method.label]
                 floor = 1e-3 * low if low else -1.0
                 if kinematic is not None:
-                    axes.plot(first.t, np.maximum(kinematic(run), floor), color=colour, linewidth=0.7, alpha=0.6, linestyle=":")
-                axes.plot(first.t, np.maximum(physical(run), floor), color=colour, linewidth=1.2, linestyle=dash, alpha=0.9)
+                    axes.plot(
+                        first.t,
+                        np.maximum(kinematic(run), floor),
+                        color=colour,
+                        linewidth=0.7,
+                        alpha=0.6,
+                        linestyle=":",
+                    )
+                axes.plot(
+                    first.t, np.maximum(physical(run), floor), color=colour, linewidth=1.2, linestyle=dash, alpha=0.9
+                )
             if low:
                 axes.set_yscale("log")
             axes.set_ylim(low, high)

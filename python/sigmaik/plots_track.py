@@ -48,7 +48,9 @@ def time_figure(runs: Sequence[Follow], by: Literal["method", "mode"]) -> Figure
         panels[1].plot(e.t, np.maximum(np.degrees(run.orientation_error), 1e-2), **style)
         t, jerk = _envelope(e.t, np.abs(run.jerk).max(axis=1), round(0.1 * e.settings.rate))
         panels[2].plot(t, np.maximum(jerk, 1.0), **style)
-    for panel, text in zip(panels, ("position error [mm]", "orientation error [°]", "joint jerk, largest\nin 0.1 s [rad/s³]"), strict=True):
+    for panel, text in zip(
+        panels, ("position error [mm]", "orientation error [°]", "joint jerk, largest\nin 0.1 s [rad/s³]"), strict=True
+    ):
         panel.set_yscale("log")
         panel.set_ylabel(text)
         panel.grid(alpha=0.25)
@@ -57,7 +59,9 @@ def time_figure(runs: Sequence[Follow], by: Literal["method", "mode"]) -> Figure
     panels[1].set_ylim(bottom=0.02)
     panels[2].set_xlabel("time [s]")
     panels[2].set_xlim(0.0, e.t[-1])
-    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=5, frameon=False, fontsize=9)
+    figure.legend(
+        *panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=5, frameon=False, fontsize=9
+    )
     return figure
 
 
@@ -84,7 +88,9 @@ def path_figure(run: Follow) -> Figure:
         panel.set_xlabel(f"{names[0]} [m]")
         panel.set_ylabel(f"{names[1]} [m]")
         panel.grid(alpha=0.25)
-    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=5, frameon=False, fontsize=9)
+    figure.legend(
+        *panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=5, frameon=False, fontsize=9
+    )
     return figure
 
 
@@ -126,7 +132,13 @@ def event_figure(runs: Sequence[Follow]) -> Figure:
             )  # fmt: skip
         for run in runs:
             label = run.variant.mode + (", feed-forward" if run.variant.feedforward else "")
-            panel.plot(e.t[part], run.tips[:-1][part, axis, 3], color=_MODES[run.variant.mode], linewidth=1.5, label=f"tip, {label}")
+            panel.plot(
+                e.t[part],
+                run.tips[:-1][part, axis, 3],
+                color=_MODES[run.variant.mode],
+                linewidth=1.5,
+                label=f"tip, {label}",
+            )
         panel.set_title(title, fontsize=11)
         panel.set_xlabel("time [s]")
         panel.set_ylabel(f"{'xyz'[axis]} [m]")

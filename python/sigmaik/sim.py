@@ -73,11 +73,14 @@ class Simulation:
     ) -> None:
         """
         chain: an arm all of whose moving links have inertias (see Dynamics)
-        actuation: what `step` takes. "velocity": each joint has a velocity loop of its own, closed in every physics step,
-            τ = K_v (e + ω_i ∫ e dt) + g(q), e = q̇_command − q̇, cut at the effort limit; "torque": τ itself, held over the control period, cut
+        actuation: what `step` takes. "velocity": each joint has a velocity loop of its own, closed in every physics
+        step,
+            τ = K_v (e + ω_i ∫ e dt) + g(q), e = q̇_command − q̇, cut at the effort limit; "torque": τ itself, held over
+            the control period, cut
         timestep: [s] of physics; it divides control_period
         control_period: [s] from one command to the next
-        bandwidth: ω_v [1/s] of the velocity loops: K_v = ω_v · max M_ii, the most over 256 configurations. As M ≤ n diag(M),
+        bandwidth: ω_v [1/s] of the velocity loops: K_v = ω_v · max M_ii, the most over 256 configurations. As M ≤ n
+        diag(M),
             no motion's error decays more slowly than with ω_v/n. K_v q̇ is integrated implicitly: any ω_v is stable
         integral_rate: ω_i [1/s]; 0: no integral. It stands still while its joint's torque is cut
         gravity_compensation: g(q), of the arm alone: the drives do not know the payload. Of "velocity" only
@@ -93,8 +96,8 @@ class Simulation:
         delay: control periods by which measurements are late
         seed: of the noise
 
-        Error where a value is out of its range, where timestep does not divide control_period, or where Dynamics refuses;
-        console.MissingPackage where MuJoCo is not installed.
+        Error where a value is out of its range, where timestep does not divide control_period, or where Dynamics
+        refuses; console.MissingPackage where MuJoCo is not installed.
         """
         need("mujoco", "sim")
         if actuation not in ("velocity", "torque"):
@@ -128,7 +131,9 @@ class Simulation:
         }
         # Refuses arms and payloads without dynamics. Gravity alone is what the drives compensate.
         _core.Dynamics(chain, gravity, payload)
-        self._compensation = _core.Dynamics(chain, gravity) if gravity_compensation and actuation == "velocity" else None
+        self._compensation = (
+            _core.Dynamics(chain, gravity) if gravity_compensation and actuation == "velocity" else None
+        )
         effort = np.array(chain.limits.effort)
         self._effort = effort if effort_limits else np.full(n, math.inf)
         self._cut = (1.0 - 1e-9) * self._effort  # a torque that was scaled down to its limit counts
@@ -138,7 +143,9 @@ class Simulation:
         if actuation == "velocity":
             samples = np.random.default_rng(0)
             loaded = _core.Dynamics(chain, gravity)
-            most = np.max([np.diag(loaded.mass_matrix(chain.random_configuration(samples))) for _ in range(256)], axis=0)
+            most = np.max(
+                [np.diag(loaded.mass_matrix(chain.random_configuration(samples))) for _ in range(256)], axis=0
+            )
             gain = bandwidth * (most + joints["armature"])
         self._gain, self._integral_rate = gain, integral_rate
         self.model = _model(chain, gain, self._effort, position_stops, joints, payload, gravity, timestep)
@@ -172,8 +179,8 @@ class Simulation:
     def step(self, command: ArrayLike) -> Measurement:
         """Drives the joints by a command (n,) [rad/s, or N·m] for one control period; then measures.
 
-        Error where the command has a wrong size or is not finite, and where the motion is no longer finite. Of the latter
-        MuJoCo itself warns on stderr and in a file MUJOCO_LOG.TXT.
+        Error where the command has a wrong size or is not finite, and where the motion is no longer finite. Of the
+        latter MuJoCo itself warns on stderr and in a file MUJOCO_LOG.TXT.
         """
         asked = self._sized(command, "the command")
         data = self.data
@@ -318,8 +325,8 @@ def _model(
         inertias.append([(payload, np.eye(4))])
     model = spec.compile()
 
-    # MuJoCo's compiler refuses inertias that no body has, which its solver takes: the PUMA's published ones are such. So
-    # the bodies were compiled with others.
+    # MuJoCo's compiler refuses inertias that no body has, which its solver takes: the PUMA's published ones are such.
+    # So the bodies were compiled with others.
     for number, parts in enumerate(inertias, start=1):
         mass, centre, tensor = _together(parts)
         moments, axes = np.linalg.eigh(tensor)
@@ -355,7 +362,8 @@ def _quaternion(rotation: Array) -> Array:
 
 
 def _together(parts: Sequence[tuple[_core.Inertia, Array]]) -> tuple[float, Array, Array]:
-    """Mass, centre and tensor about it, of inertias in frames (4, 4), in the frame of these. Steiner: m (r·r I − r rᵀ)."""
+    """Mass, centre and tensor about it, of inertias in frames (4, 4), in the frame of these. Steiner: m (r·r I − r
+    rᵀ)."""
     mass = sum(inertia.mass for inertia, _ in parts)
     centres = [frame[:3, :3] @ inertia.center_of_mass + frame[:3, 3] for inertia, frame in parts]
     centre = np.zeros(3)
@@ -380,7 +388,9 @@ class Execution:
     planned: Array = field(repr=False)  #: (N, n) [rad or m]
     q: Array = field(repr=False)  #: (N, n) where the arm truly was
     qdot: Array = field(repr=False)  #: (N, n) [rad/s or m/s]
-    torque: Array = field(repr=False)  #: (N, n) the largest |τ| in the period after the sample (the last: before) [N·m or N]
+    torque: Array = field(
+        repr=False
+    )  #: (N, n) the largest |τ| in the period after the sample (the last: before) [N·m or N]
     saturation: Array = field(repr=False)  #: (N, n) the part of it at the effort limit
     effort: Array = field(repr=False)  #: (n,) the effort limits, infinite where there is none
 

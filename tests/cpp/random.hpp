@@ -66,9 +66,9 @@ class Random {
       sigmaik::Segment s;
       s.joint_name = "j" + std::to_string(i);
       s.link_name = "l" + std::to_string(i);
-      s.type = chance(prismatic)  ? sigmaik::JointType::Prismatic
-               : chance(0.3)      ? sigmaik::JointType::Continuous
-                                  : sigmaik::JointType::Revolute;
+      s.type = chance(prismatic) ? sigmaik::JointType::Prismatic
+               : chance(0.3)     ? sigmaik::JointType::Continuous
+                                 : sigmaik::JointType::Revolute;
       s.origin = pose(size);
       s.axis = unit(3);
       segments.push_back(s);

@@ -44,7 +44,7 @@ const char* const kShipped[] = {"kuka_kr6_r900", "comau_racer_7_1_4", "puma560"}
 
 static_assert(noexcept(std::declval<const AnalyticIk&>().solve(std::declval<const Pose&>())));
 static_assert(noexcept(std::declval<const AnalyticIk&>().nearest(std::declval<const Pose&>(),
-                                                                  std::declval<const sigmaik::JointRef&>())));
+                                                                 std::declval<const sigmaik::JointRef&>())));
 
 Chain load(const std::string& name) { return Chain::from_urdf(std::string(SIGMAIK_ROBOTS_DIR) + "/" + name + ".urdf"); }
 
@@ -743,8 +743,8 @@ TEST_CASE("turns of the KUKA's wrist") {
   JointVector lower = beyond.array() - 0.5, upper = beyond.array() + 0.5;
   lower[5] = chain.limits().lower[5];
   upper[5] = chain.limits().upper[5];
-  const AnalyticNearest nearest =
-      AnalyticIk(with_limits(chain, lower, upper)).nearest(sigmaik::pose(chain, beyond), beyond);
+  const AnalyticNearest nearest = AnalyticIk(with_limits(chain, lower, upper))
+                                      .nearest(sigmaik::pose(chain, beyond), beyond);
   CHECK(nearest.branch.within_limits);
   CHECK((nearest.branch.q - back).cwiseAbs().maxCoeff() < 1e-12);
   // solve() chooses the turns nearest to zero.

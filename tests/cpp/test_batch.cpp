@@ -35,8 +35,8 @@ struct Problem {
   std::vector<double> jacobian, twist;
 
   MatrixXd j(std::size_t b) const {
-    return Eigen::Map<const RowMajor>(jacobian.data() + b * static_cast<std::size_t>(shape.rows * shape.cols), shape.rows,
-                                      shape.cols);
+    return Eigen::Map<const RowMajor>(jacobian.data() + b * static_cast<std::size_t>(shape.rows * shape.cols),
+                                      shape.rows, shape.cols);
   }
   VectorXd x(std::size_t b) const {
     return Eigen::Map<const VectorXd>(twist.data() + b * static_cast<std::size_t>(shape.rows), shape.rows);
@@ -107,7 +107,8 @@ TEST_CASE("what is not finite gives zero, and harms no neighbour") {
 }
 
 TEST_CASE("an empty batch is nothing to do") {
-  for (const int threads : {1, 4}) CHECK_NOTHROW(solve_batch(JParse{}, 1.0, {0, 6, 7}, nullptr, nullptr, nullptr, nullptr, threads));
+  for (const int threads : {1, 4})
+    CHECK_NOTHROW(solve_batch(JParse{}, 1.0, {0, 6, 7}, nullptr, nullptr, nullptr, nullptr, threads));
 }
 
 TEST_CASE("shapes and parameters out of their range are refused before anything is written") {

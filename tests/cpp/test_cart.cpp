@@ -63,7 +63,8 @@ TEST_CASE("the two experiments: energy, contact, speed") {
   };
   const Reference references[] = {
       {line(0.2607, 0.1354, 0.8531, -0.2549, 5068), 36.072246e-6, 0.8297348, 2378, 4177, 0.859339, 2.48162e-3},
-      {line(0.26036729999, 0.19588536, 0.81570562, -0.30245277, 5068), 24.359793e-6, 0.7781139, 2362, 3605, 0.794411, 2.31573e-3}};
+      {line(0.26036729999, 0.19588536, 0.81570562, -0.30245277, 5068), 24.359793e-6, 0.7781139, 2362, 3605, 0.794411,
+       2.31573e-3}};
   for (const Reference& r : references) {
     const CartLaw law = cart_law(r.path, 0.5, 0.75, 0.2, {.lower = 0.0, .upper = 1.0, .turn = 2.47, .duration = 200.0});
     CHECK(law.energy == doctest::Approx(r.energy).epsilon(2e-8));
@@ -78,7 +79,8 @@ TEST_CASE("the two experiments: energy, contact, speed") {
     CHECK(law.turn == doctest::Approx(2.47).epsilon(1e-3));
     CHECK(law.strings == 1);
     double speed = 0.0;
-    for (Eigen::Index i = 0; i + 1 < law.x.size(); ++i) speed = std::max(speed, std::abs(law.x[i + 1] - law.x[i]) * 5067 / 200.0);
+    for (Eigen::Index i = 0; i + 1 < law.x.size(); ++i)
+      speed = std::max(speed, std::abs(law.x[i + 1] - law.x[i]) * 5067 / 200.0);
     CHECK(speed == doctest::Approx(r.speed).epsilon(1e-5));
   }
 }
@@ -207,7 +209,8 @@ TEST_CASE("branch and bound finds what going through all sides finds") {
     const int m = random.integer(40, 200);
     const PlanarPath path = wave(random, m, random.uniform(1.0, 3.0), random.uniform(0.3, 1.0));
     const double r = random.uniform(0.05, 0.25), start = random.uniform(-1, 1), end = random.uniform(-1, 1);
-    if (std::hypot(path(0, 0) - start, path(0, 1)) <= r || std::hypot(path(m - 1, 0) - end, path(m - 1, 1)) <= r) continue;
+    if (std::hypot(path(0, 0) - start, path(0, 1)) <= r || std::hypot(path(m - 1, 0) - end, path(m - 1, 1)) <= r)
+      continue;
     // Parts of the region over the samples, and the least energy over all their sides: tubes of samples alone, so only
     // paths whose best string touches no tip can be compared.
     VectorXd low, high;
@@ -226,7 +229,8 @@ TEST_CASE("branch and bound finds what going through all sides finds") {
       bool possible = true;
       for (std::size_t j = 0; j < parts.size(); ++j) {
         const bool above = (bits >> j & 1u) != 0;
-        for (int i = parts[j].first; i <= parts[j].second; ++i) (above ? lower[i] : upper[i]) = above ? high[i] : low[i];
+        for (int i = parts[j].first; i <= parts[j].second; ++i)
+          (above ? lower[i] : upper[i]) = above ? high[i] : low[i];
         if (parts[j].first == 0) possible = possible && above == (start > path(0, 0));
         if (parts[j].second == m - 1) possible = possible && above == (end > path(m - 1, 0));
       }
@@ -245,7 +249,7 @@ TEST_CASE("branch and bound finds what going through all sides finds") {
       bool tip = false;
       for (const double at : law.corners) tip = tip || at != std::floor(at);
       if (law.regions.size() != parts.size()) continue;  // one lies between samples
-      CHECK(law.energy >= best * (1.0 - 1e-12));  // tips only take room away
+      CHECK(law.energy >= best * (1.0 - 1e-12));         // tips only take room away
       if (tip) continue;
       ++several;
       turned += turn < 1e8;
@@ -289,7 +293,8 @@ TEST_CASE("lengths have no unit, and the path may be run backwards or mirrored")
 TEST_CASE("a larger circle costs more, and any other law is faster") {
   Random random(6);
   for (int trial = 0; trial < 100; ++trial) {
-    const PlanarPath path = line(random.uniform(-1, 1), random.uniform(0.3, 1), random.uniform(-1, 1), -random.uniform(0.3, 1), 200);
+    const PlanarPath path = line(random.uniform(-1, 1), random.uniform(0.3, 1), random.uniform(-1, 1),
+                                 -random.uniform(0.3, 1), 200);
     const double start = path(0, 0) + random.uniform(-1, 1), end = path(199, 0) + random.uniform(-1, 1);
     double energy = 0.0;
     for (const double r : {0.02, 0.05, 0.1, 0.2, 0.25}) {
@@ -327,7 +332,8 @@ TEST_CASE("limits of speed and acceleration are kept, at tips between samples to
       double top = 0.0;
       for (Eigen::Index i = 1; i + 1 < m; ++i) top = std::max(top, std::abs(second_difference(free.x, i)));
       options.max_acceleration = top * random.uniform(0.2, 1.0) + 1e-9;
-      options.max_speed = random.chance(0.5) ? kInfinity : 3.0 * (free.x.tail(m - 1) - free.x.head(m - 1)).cwiseAbs().maxCoeff();
+      options.max_speed = random.chance(0.5) ? kInfinity
+                                             : 3.0 * (free.x.tail(m - 1) - free.x.head(m - 1)).cwiseAbs().maxCoeff();
       options.at_rest = random.chance(0.5);
       const CartLaw law = cart_law(path, start, end, r, options);
       ++limited;
@@ -464,7 +470,8 @@ TEST_CASE("gradient descent: a step is down the slope of (10), and ends where H 
   };
   const VectorXd x = 0.2 * random.vector(40);
   VectorXd moved = x;
-  CHECK(cart_descent(low, high, moved, {.alpha = alpha, .step = step, .max_iterations = 1, .until_admissible = false}) == 1);
+  CHECK(cart_descent(low, high, moved,
+                     {.alpha = alpha, .step = step, .max_iterations = 1, .until_admissible = false}) == 1);
   for (Eigen::Index i = 1; i + 1 < 40; ++i) {
     VectorXd up = 1e3 * x, down = 1e3 * x;
     up[i] += 1e-4;

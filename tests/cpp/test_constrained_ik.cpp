@@ -1,5 +1,5 @@
-// ConstrainedIk against Schreiber, Otter and Hirzinger's equations, and against what it promises: limits held, the exact
-// part exact, the rest as well as can be, time scaling, torques, and the closed form where it will do.
+// ConstrainedIk against Schreiber, Otter and Hirzinger's equations, and against what it promises: limits held, the
+// exact part exact, the rest as well as can be, time scaling, torques, and the closed form where it will do.
 
 #include <doctest/doctest.h>
 
@@ -370,8 +370,8 @@ TEST_CASE("torque limits are the dynamics', and come before the exact part") {
     const double t = o.dt * i;
     by.head<3>() << 0.1 * std::sin(4.0 * t), 0.15 * std::sin(3.0 * t), 0.1 * std::sin(5.0 * t);
     const ConstrainedIkStep step = ik.step(moved(start, by));
-    const VectorXd torque = dynamics.mass_matrix(q) * VectorXd((step.qdot - qdot) / o.dt) +
-                            dynamics.coriolis(q, qdot) + dynamics.gravity(q);
+    const VectorXd torque = dynamics.mass_matrix(q) * VectorXd((step.qdot - qdot) / o.dt) + dynamics.coriolis(q, qdot) +
+                            dynamics.gravity(q);
     const double share = (torque.cwiseAbs().cwiseQuotient(VectorXd(limits.effort))).maxCoeff();
     active += step.torque_active;
     if (share > 1.0 + 1e-6) {

@@ -80,7 +80,8 @@ TEST_CASE("power is the change of energy: q̇ᵀ (C q̇) is half of q̇ᵀ Ṁ q
     const double h = 1e-5;
     const MatrixXd rate = (dynamics.mass_matrix(q + h * qdot) - dynamics.mass_matrix(q - h * qdot)) / (2.0 * h);
     const double energy = 1.0 + qdot.dot(dynamics.mass_matrix(q) * qdot);
-    CHECK(qdot.dot(dynamics.coriolis(q, qdot)) - 0.5 * qdot.dot(rate * qdot) == doctest::Approx(0.0).scale(energy).epsilon(1e-6));
+    CHECK(qdot.dot(dynamics.coriolis(q, qdot)) - 0.5 * qdot.dot(rate * qdot) ==
+          doctest::Approx(0.0).scale(energy).epsilon(1e-6));
   }
 }
 

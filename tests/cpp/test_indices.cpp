@@ -150,7 +150,8 @@ TEST_CASE("base and threads do not matter, units do as they should") {
     segments.front().origin = random.pose() * segments.front().origin;
     const Chain moved("table", segments);
     const std::size_t count = 101;
-    const MatrixXd q = MatrixXd::NullaryExpr(n, static_cast<Eigen::Index>(count), [&] { return random.uniform(-2.0, 2.0); });
+    const MatrixXd q = MatrixXd::NullaryExpr(n, static_cast<Eigen::Index>(count),
+                                             [&] { return random.uniform(-2.0, 2.0); });
     for (const Index index : kAll) {
       const IndexFunction function(index);
       std::vector<double> one(count), two(count), g1(count * static_cast<std::size_t>(n)), g2(g1);
@@ -191,8 +192,8 @@ TEST_CASE("what is refused") {
   CHECK_THROWS_AS(IndexFunction(Index::GeometryAware, {.sigma = skew}), Error);
   double value;
   const JointVector zero = JointVector::Zero(7);
-  CHECK_THROWS_AS(evaluate(test::arms().at("franka_panda"), IndexFunction(Index::Manipulability), 1, zero.data(), &value,
-                           nullptr, 0),
+  CHECK_THROWS_AS(evaluate(test::arms().at("franka_panda"), IndexFunction(Index::Manipulability), 1, zero.data(),
+                           &value, nullptr, 0),
                   Error);
 }
 

@@ -108,8 +108,8 @@ KDL::Chain oracle(const std::vector<Segment>& segments) {
     chain.addSegment(KDL::Segment("", KDL::Joint(KDL::Joint::None), frame_of(s.origin)));
     if (s.type == JointType::Fixed) continue;
     const bool slides = s.type == JointType::Prismatic;
-    chain.addSegment(KDL::Segment("", KDL::Joint(KDL::Vector::Zero(), vector_of(s.axis),
-                                                 slides ? KDL::Joint::TransAxis : KDL::Joint::RotAxis)));
+    chain.addSegment(KDL::Segment(
+        "", KDL::Joint(KDL::Vector::Zero(), vector_of(s.axis), slides ? KDL::Joint::TransAxis : KDL::Joint::RotAxis)));
   }
   return chain;
 }
@@ -306,8 +306,8 @@ KDL::RigidBodyInertia kdl_inertia(const sigmaik::Inertia& inertia) {
 
 TEST_CASE("from KDL: every joint type, offset, direction and tip") {
   using KDL::Joint;
-  constexpr std::array kTypes{Joint::RotAxis,   Joint::RotX,   Joint::RotY,   Joint::RotZ,  Joint::TransAxis,
-                              Joint::TransX, Joint::TransY, Joint::TransZ, Joint::None};
+  constexpr std::array kTypes{Joint::RotAxis, Joint::RotX,   Joint::RotY,   Joint::RotZ, Joint::TransAxis,
+                              Joint::TransX,  Joint::TransY, Joint::TransZ, Joint::None};
   Random random(kSeed);
   for (int i = 0; i < 1500; ++i) {
     CAPTURE(i);
@@ -320,8 +320,8 @@ TEST_CASE("from KDL: every joint type, offset, direction and tip") {
       const double offset = random.chance(0.5) ? 0.0 : random.uniform(-2.0, 2.0);
       const std::string number = std::to_string(kdl.getNrOfSegments());
       const bool free_axis = type == Joint::RotAxis || type == Joint::TransAxis;
-      const Joint joint = free_axis ? Joint("j" + number, vector_of(random.vector(1.0)), vector_of(random.axis()),
-                                            type, scale, offset)
+      const Joint joint = free_axis ? Joint("j" + number, vector_of(random.vector(1.0)), vector_of(random.axis()), type,
+                                            scale, offset)
                                     : Joint("j" + number, type, scale, offset);
       inertias.push_back(random.inertia());
       kdl.addSegment(KDL::Segment("l" + number, joint, frame_of(random.pose()), kdl_inertia(inertias.back())));
@@ -373,8 +373,8 @@ TEST_CASE("from KDL: no names, no limits") {
   }
   // Only the third's tip lies off its axis.
   CHECK(links == std::vector<std::string>{"link1", "link2", "link3_joint", "link3", "joint4", "link5_"});
-  CHECK(chain.joint_types() == std::vector<JointType>{JointType::Revolute, JointType::Revolute, JointType::Prismatic,
-                                                      JointType::Revolute});
+  CHECK(chain.joint_types() ==
+        std::vector<JointType>{JointType::Revolute, JointType::Revolute, JointType::Prismatic, JointType::Revolute});
   for (const JointVector* limit : {&chain.limits().upper, &chain.limits().velocity, &chain.limits().acceleration,
                                    &chain.limits().jerk, &chain.limits().effort}) {
     CHECK((limit->array() == std::numeric_limits<double>::infinity()).all());

@@ -202,14 +202,17 @@ TEST_CASE("optimal, level by level: random, rank-deficient, degenerate and infea
     const LeastSquaresProblem p = random_problem(random);
     if (random.chance(0.5)) solver.reset();
     const LeastSquaresSolution s = solver.solve(p);
-    if (s.status == LeastSquaresStatus::BadInput) MESSAGE(i, " ", p.lower.transpose(), " ", p.upper.transpose(), " ", p.h.transpose(), " ", p.A.cols(), p.C.cols(), p.G.cols());
+    if (s.status == LeastSquaresStatus::BadInput)
+      MESSAGE(i, " ", p.lower.transpose(), " ", p.upper.transpose(), " ", p.h.transpose(), " ", p.A.cols(), p.C.cols(),
+              p.G.cols());
     REQUIRE(s.status != LeastSquaresStatus::BadInput);
     most_steps = std::max(most_steps, s.steps);
     limited += s.status == LeastSquaresStatus::StepLimit;
     const Optimality optimality = measure(p, s.x);
     REQUIRE(optimality.bounds <= 0.0);
     worst = std::max(worst, optimality.worst());
-    if (s.status == LeastSquaresStatus::StepLimit) MESSAGE("limited ", i, " n ", s.x.size(), " m ", p.A.rows(), " p ", p.C.rows(), " k ", p.G.rows());
+    if (s.status == LeastSquaresStatus::StepLimit)
+      MESSAGE("limited ", i, " n ", s.x.size(), " m ", p.A.rows(), " p ", p.C.rows(), " k ", p.G.rows());
     if (optimality.worst() > 1e-7) {
       ++failed;
       if (failed <= 5) {

@@ -215,7 +215,7 @@ TEST_CASE("from outside: acceleration and jerk hold, speed falls, the joint come
         order += !(lower <= upper);
         const double low = std::clamp(-20.0, lower, upper), high = std::clamp(20.0, lower, upper);
         const bool above = tracker.q()[0] > 0.0;
-        JointVector choice = one(policy == 0 ? (above ? high : low)  // as slowly as allowed
+        JointVector choice = one(policy == 0   ? (above ? high : low)  // as slowly as allowed
                                  : policy == 1 ? high
                                  : policy == 2 ? low
                                                : random.uniform(low, high));
@@ -255,8 +255,7 @@ TEST_CASE("no more is given up than must be: a limit is reached in the least tim
     if (random.chance(0.9)) limits.velocity[0] = random.decades(-1.0, 1.0);
     limits.acceleration[0] = random.decades(-1.0, 3.0);
     if (random.chance(0.8)) limits.jerk[0] = random.decades(0.0, 6.0);
-    const double cycles =
-        least_time(distance, limits.velocity[0], limits.acceleration[0], limits.jerk[0]) / dt;
+    const double cycles = least_time(distance, limits.velocity[0], limits.acceleration[0], limits.jerk[0]) / dt;
     if (cycles < 3.0 || cycles > 20000.0) continue;
     const bool up = random.chance(0.5);
     const double goal = up ? limits.upper[0] : limits.lower[0];
@@ -326,8 +325,7 @@ TEST_CASE("a jerk limit that is large enough is none") {
     free.reset(start);
     bound.reset(start);
     Chooser chooser(random, dt, start[0]);
-    const double scale =
-        std::min({limits.velocity[0], half / dt, std::sqrt(half * limits.acceleration[0])});
+    const double scale = std::min({limits.velocity[0], half / dt, std::sqrt(half * limits.acceleration[0])});
     double worst = 0.0;
     for (int cycle = 0; cycle < 500; ++cycle) {
       const VelocityBounds &a = free.bounds(), &b = bound.bounds();

@@ -215,11 +215,11 @@ TEST_CASE("a URDF's shapes are covered whole, and not by much more") {
   const ArmSpheres spheres = ArmSpheres::from_urdf(chain, xml, 0.05);
   int on[5] = {};
   for (const LinkSphere& s : spheres.spheres()) ++on[s.segment + 1];
-  CHECK(on[0] == 1);   // the visual, where there is no collision shape
-  CHECK(on[1] == 9);   // ⌈0.5/0.07⌉ = 8, and the small sphere
-  CHECK(on[2] == 4);   // a box of 3×1×1, and the tool beside the arm; not the finger
-  CHECK(on[3] == 5);   // 0.25 m in steps of 0.05 m
-  CHECK(on[4] == 0);   // no shape
+  CHECK(on[0] == 1);  // the visual, where there is no collision shape
+  CHECK(on[1] == 9);  // ⌈0.5/0.07⌉ = 8, and the small sphere
+  CHECK(on[2] == 4);  // a box of 3×1×1, and the tool beside the arm; not the finger
+  CHECK(on[3] == 5);  // 0.25 m in steps of 0.05 m
+  CHECK(on[4] == 0);  // no shape
   CHECK(spheres.first_moving() == 1);
   const auto covered = [&](int segment, const Vector3d& p) {
     double least = 1.0;
@@ -228,8 +228,11 @@ TEST_CASE("a URDF's shapes are covered whole, and not by much more") {
     }
     return least < 1e-12;
   };
-  const auto turned = [](double angle, const Vector3d& axis) { return Eigen::AngleAxisd(angle, axis).toRotationMatrix(); };
-  const Eigen::Matrix3d rpy = turned(0.5, Vector3d::UnitZ()) * turned(-0.4, Vector3d::UnitY()) * turned(0.3, Vector3d::UnitX());
+  const auto turned = [](double angle, const Vector3d& axis) {
+    return Eigen::AngleAxisd(angle, axis).toRotationMatrix();
+  };
+  const Eigen::Matrix3d rpy = turned(0.5, Vector3d::UnitZ()) * turned(-0.4, Vector3d::UnitY()) *
+                              turned(0.3, Vector3d::UnitX());
   for (int trial = 0; trial < 20000; ++trial) {
     const double angle = random.uniform(-M_PI, M_PI);
     const Vector3d rim(0.07 * std::cos(angle), 0.07 * std::sin(angle), random.uniform(-0.25, 0.25));
@@ -339,7 +342,13 @@ TEST_CASE("where distances are linear in q, the Hessian is the true one") {
   JointMatrix h(3, 3), h2(3, 3);
   REQUIRE(cost->model(q, g, h) > 0.0);
   for (int k = 0; k < 3; ++k) {
-    const JointVector column = differences(q, [&](const JointVector& x) { cost->model(x, g2, h2); return g2[k]; }, 1e-5);
+    const JointVector column = differences(
+        q,
+        [&](const JointVector& x) {
+          cost->model(x, g2, h2);
+          return g2[k];
+        },
+        1e-5);
     CHECK((h.col(k) - column).cwiseAbs().maxCoeff() < 1e-6);
   }
 }
@@ -438,10 +447,19 @@ TEST_CASE("joint-limit cost and sums") {
     const double value = limits->model(q, g, h);
     CHECK(value == doctest::Approx(expected).epsilon(1e-12));
     CHECK(limits->value(q) == doctest::Approx(expected).epsilon(1e-12));
-    CHECK((g - differences(q, [&](const JointVector& x) { return limits->value(x); }, 1e-6)).cwiseAbs().maxCoeff() < 1e-5);
+    CHECK((g - differences(
+                   q, [&](const JointVector& x) { return limits->value(x); }, 1e-6))
+              .cwiseAbs()
+              .maxCoeff() < 1e-5);
     for (int k = 0; k < 7; ++k) {
       JointMatrix scratch(7, 7);
-      const JointVector column = differences(q, [&](const JointVector& x) { limits->model(x, g2, scratch); return g2[k]; }, 1e-6);
+      const JointVector column = differences(
+          q,
+          [&](const JointVector& x) {
+            limits->model(x, g2, scratch);
+            return g2[k];
+          },
+          1e-6);
       CHECK((h.col(k) - column).cwiseAbs().maxCoeff() < 1e-5);
     }
     const double other = obstacles->model(q, g2, h2);
@@ -495,7 +513,8 @@ TEST_CASE("what is refused") {
                        "the grid has 1 nodes along axis 2; at least 2 are needed", Error);
   CHECK_THROWS_WITH_AS(DistanceField(eight, {2, 2, 3}, Vector3d::Zero(), 0.1),
                        "there are 8 distances for a grid of 2×2×3 = 12 nodes", Error);
-  for (const double bad : {0.0, -1.0, kNaN}) CHECK_THROWS_AS(DistanceField(eight, {2, 2, 2}, Vector3d::Zero(), bad), Error);
+  for (const double bad : {0.0, -1.0, kNaN})
+    CHECK_THROWS_AS(DistanceField(eight, {2, 2, 2}, Vector3d::Zero(), bad), Error);
   CHECK_THROWS_AS(DistanceField(eight, {2, 2, 2}, Vector3d(0.0, kNaN, 0.0), 0.1), Error);
   std::vector<double> broken = eight;
   broken[5] = kNaN;
@@ -532,7 +551,8 @@ TEST_CASE("what is refused") {
   CHECK_THROWS_AS(ArmSpheres::from_urdf(arm, robots + "/none.urdf"), Error);
   const auto one_link = [](const std::string& shape) {
     return R"(<robot name="r"><link name="a"/><joint name="j" type="continuous"><parent link="a"/><child link="b"/></joint>
-              <link name="b">)" + shape + "</link></robot>";
+              <link name="b">)" +
+           shape + "</link></robot>";
   };
   const Chain small = Chain::from_urdf(one_link(""));
   CHECK_THROWS_AS(ArmSpheres::from_urdf(small, one_link("")), Error);
@@ -550,7 +570,7 @@ TEST_CASE("no heap") {
   const ArmSpheres spheres = ArmSpheres::along_links(arm);
   const DistanceField field = room(0.05);
   const JointCostPtr cost = sum_of_costs({collision_cost(spheres, field, 0.5), joint_limit_cost(arm, 1.0),
-                                    self_collision_cost(spheres, self_collision_pairs(spheres), 0.5)});
+                                          self_collision_cost(spheres, self_collision_pairs(spheres), 0.5)});
   const JointVector q = JointVector::Constant(7, 0.5);
   JointVector gradient(7);
   JointMatrix hessian(7, 7);

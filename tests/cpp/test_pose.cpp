@@ -61,8 +61,8 @@ std::vector<Vector3d> axes(Random& random) {
 
 TEST_CASE("logarithm: every angle about every axis") {
   Random random(1);
-  std::vector<double> angles{1e-300, 1e-200, 1e-16, 1e-12, 1e-9, 1e-8, 1e-6, 1e-3, 0.1, 0.5 * kPi, 2.0 * kPi / 3.0,
-                             3.0, 3.1, kPi - 1e-3, kPi - 1e-6, kPi - 1e-8};
+  std::vector<double> angles{1e-300, 1e-200,    1e-16,           1e-12, 1e-9, 1e-8,       1e-6,       1e-3,
+                             0.1,    0.5 * kPi, 2.0 * kPi / 3.0, 3.0,   3.1,  kPi - 1e-3, kPi - 1e-6, kPi - 1e-8};
   for (int i = 0; i < 40; ++i) angles.push_back(random.uniform(0.0, 3.14));
   for (const Vector3d& axis : axes(random)) {
     for (const double angle : angles) {

@@ -155,8 +155,8 @@ TEST_CASE("servos and constrained inverse kinematics with limits active pass Eig
 TEST_CASE("closed forms and torque limits in constrained inverse kinematics pass Eigen's checks") {
   const std::string robots = SIGMAIK_ROBOTS_DIR;
   for (const bool torque : {false, true}) {
-    const sigmaik::Chain chain =
-        sigmaik::Chain::from_urdf(robots + (torque ? "/franka_panda.urdf" : "/puma560.urdf"), "", "flange");
+    const sigmaik::Chain chain = sigmaik::Chain::from_urdf(robots + (torque ? "/franka_panda.urdf" : "/puma560.urdf"),
+                                                           "", "flange");
     sigmaik::ConstrainedIkOptions options;
     options.torque_limits = torque;
     options.gamma = 1.0;
@@ -205,8 +205,9 @@ TEST_CASE("costs of collisions of every size pass Eigen's checks") {
   for (int n = 2; n <= sigmaik::kMaxJoints; ++n) {
     const sigmaik::Chain chain = random.chain(n, 0.3);
     const ArmSpheres spheres = ArmSpheres::along_links(chain, 0.1);
-    const JointCostPtr cost = sum_of_costs({collision_cost(spheres, field, 0.5), joint_limit_cost(chain),
-                                      self_collision_cost(spheres, self_collision_pairs(spheres, 0.3, 1.0), 0.3)});
+    const JointCostPtr cost = sum_of_costs(
+        {collision_cost(spheres, field, 0.5), joint_limit_cost(chain),
+         self_collision_cost(spheres, self_collision_pairs(spheres, 0.3, 1.0), 0.3)});
     const sigmaik::JointVector q = random.configuration(n);
     sigmaik::JointVector gradient(n);
     sigmaik::JointMatrix hessian(n, n);

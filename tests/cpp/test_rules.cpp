@@ -410,7 +410,7 @@ TEST_CASE("continuous rules follow a moving Jacobian, repeated and crossing sing
   Random random(9);
   struct Case {
     Method method;
-    double gain;   // the largest g_i/c_i, times σ_max where the rule is relative
+    double gain;  // the largest g_i/c_i, times σ_max where the rule is relative
     bool relative;
     double slack;  // the rule's slope in units of gain²
   };

@@ -650,7 +650,8 @@ TEST_CASE("zero commands: nothing moves, and that is as asked") {
       ServoOptions options;
       options.position_limits = false;  // from outside it would come back
       Servo servo(chain, method, options);
-      servo.reset(random.chance(0.5) ? JointVector(JointVector::Zero(chain.dof())) : regular_configuration(random, chain));
+      servo.reset(random.chance(0.5) ? JointVector(JointVector::Zero(chain.dof()))
+                                     : regular_configuration(random, chain));
       const ServoStep step = servo.update_twist(Twist::Zero());
       CHECK(step.qdot.isZero(0.0));
       CHECK(step.status == Status::Ok);
@@ -763,7 +764,8 @@ TEST_CASE("with equal gains J-PARSE never increases the error, orientation inclu
     const Twist ahead = pose_error(pose(chain, JointVector(q + h * qdot)), target);
     const Twist behind = pose_error(pose(chain, JointVector(q - h * qdot)), target);
     const double difference = (ahead.squaredNorm() - behind.squaredNorm()) / (2.0 * h);
-    CHECK(difference == doctest::Approx(rate).epsilon(1e-4).scale(1e-4 * (1.0 + error.squaredNorm()) * (1.0 + qdot.norm())));
+    CHECK(difference ==
+          doctest::Approx(rate).epsilon(1e-4).scale(1e-4 * (1.0 + error.squaredNorm()) * (1.0 + qdot.norm())));
   }
   CHECK(descents > 2000);
 }
@@ -944,7 +946,8 @@ TEST_CASE("feed-forward: behind a moving target the error is of the order of dt,
   }
 }
 
-TEST_CASE("feed-forward: zero is none, it is added after the caps, limits are held, and what is not finite is refused") {
+TEST_CASE(
+    "feed-forward: zero is none, it is added after the caps, limits are held, and what is not finite is refused") {
   Random random(32);
   for (const auto& [name, chain] : arms()) {
     CAPTURE(name);

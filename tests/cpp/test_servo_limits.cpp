@@ -12,8 +12,8 @@
 #include <Eigen/SVD>
 
 #include <sigmaik/constrained_ik.hpp>
-#include <sigmaik/pose.hpp>
 #include <sigmaik/least_squares.hpp>
+#include <sigmaik/pose.hpp>
 #include <sigmaik/servo.hpp>
 
 #include "arms.hpp"
@@ -33,8 +33,14 @@ constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 using test::arms;
 
 std::vector<Method> some_methods() {
-  return {PseudoInverse{}, DampedLeastSquares{}, AdaptiveDampedLeastSquares{}, SelectivelyDampedLeastSquares{},
-          JParse{},        JacobianProjection{}, JacobianSafety{},             JacobianSafetyProjection{}};
+  return {PseudoInverse{},
+          DampedLeastSquares{},
+          AdaptiveDampedLeastSquares{},
+          SelectivelyDampedLeastSquares{},
+          JParse{},
+          JacobianProjection{},
+          JacobianSafety{},
+          JacobianSafetyProjection{}};
 }
 
 Jacobian jacobian(const Chain& chain, const JointVector& q) {
@@ -216,8 +222,8 @@ TEST_CASE("redundant arms: the other joints take over all of it where they can")
           } else {
             (asked[i] > 0.0 ? limits.upper : limits.lower)[i] = q[i];
           }
-          const ServoStep step =
-              once(shipped.with_limits(limits), method, holding(blocked, true, false, false), q, twist);
+          const ServoStep step = once(shipped.with_limits(limits), method, holding(blocked, true, false, false), q,
+                                      twist);
           ++cases;
           const double missed = (step.achieved_twist - twist).norm() / twist.norm();
           CHECK(missed <= 1e-3);

@@ -1,4 +1,5 @@
-// A servo in its own thread: commands from others, stale ones, changes of rule and options under way, what is read back.
+// A servo in its own thread: commands from others, stale ones, changes of rule and options under way, what is read
+// back.
 
 #include <doctest/doctest.h>
 
@@ -135,7 +136,8 @@ TEST_CASE("a change of rule at a singularity is faded in, with no acceleration l
 }
 
 TEST_CASE("taking over: refusals") {
-  Servo servo = started(), other(test::arms().at("ur10"), JParse{}), slower(panda(), JParse{}, {.dt = 2e-3}), fresh(panda(), JParse{});
+  Servo servo = started(), other(test::arms().at("ur10"), JParse{}), slower(panda(), JParse{}, {.dt = 2e-3}),
+        fresh(panda(), JParse{});
   CHECK_THROWS_AS(other.continue_from(servo), Error);
   CHECK_THROWS_AS(slower.continue_from(servo), Error);
   fresh.continue_from(Servo(panda(), JParse{}));  // nothing to take over

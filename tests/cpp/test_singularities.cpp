@@ -109,7 +109,8 @@ TEST_CASE("manipulability in closed form is that of the Jacobian, down to zero")
       const JointVector there = onto(sets, trial % sets.size(), q);
       std::array<double, kMaxSets> psi;
       sets.psi(there, psi);
-      if (psi[static_cast<std::size_t>(trial % sets.size())] < 1e-26) on_sets = std::max(on_sets, sets.manipulability(there));
+      if (psi[static_cast<std::size_t>(trial % sets.size())] < 1e-26)
+        on_sets = std::max(on_sets, sets.manipulability(there));
     }
     CAPTURE(name);
     CHECK(worst < 1e-12);
@@ -141,7 +142,15 @@ TEST_CASE("derivatives") {
         CHECK(sets.psi(i, q, g, h) == doctest::Approx(value(q)).epsilon(1e-13));
         check(g, differences(q, value, 1e-6), 10.0);
         for (int k = 0; k < n; ++k) {
-          check(h.col(k), differences(q, [&](const JointVector& x) { sets.psi(i, x, g2, h2); return g2[k]; }, 1e-6), 10.0);
+          check(h.col(k),
+                differences(
+                    q,
+                    [&](const JointVector& x) {
+                      sets.psi(i, x, g2, h2);
+                      return g2[k];
+                    },
+                    1e-6),
+                10.0);
         }
       }
       const Potential p{.weights = {1.0, 0.5, 2.0, 0.25}};
@@ -152,7 +161,14 @@ TEST_CASE("derivatives") {
       CHECK((g - g2).cwiseAbs().maxCoeff() <= 1e-12 * (1.0 + g.cwiseAbs().maxCoeff()));
       check(g, differences(q, potential, 1e-7), 10.0 * (1.0 + 40.0 * value + g.cwiseAbs().maxCoeff()));
       for (int k = 0; k < n; ++k) {
-        check(h.col(k), differences(q, [&](const JointVector& x) { sets.potential(x, p, moved); return moved[k]; }, 1e-7),
+        check(h.col(k),
+              differences(
+                  q,
+                  [&](const JointVector& x) {
+                    sets.potential(x, p, moved);
+                    return moved[k];
+                  },
+                  1e-7),
               10.0 * (1.0 + 1600.0 * value + h.cwiseAbs().maxCoeff()));
       }
       const double m = sets.manipulability(q, g, h);
@@ -162,7 +178,14 @@ TEST_CASE("derivatives") {
       if (m < 1e-3) continue;
       check(g, differences(q, [&](const JointVector& x) { return sets.manipulability(x); }, 1e-6), 1.0);
       for (int k = 0; k < n; ++k) {
-        check(h.col(k), differences(q, [&](const JointVector& x) { sets.manipulability(x, moved); return moved[k]; }, 1e-6),
+        check(h.col(k),
+              differences(
+                  q,
+                  [&](const JointVector& x) {
+                    sets.manipulability(x, moved);
+                    return moved[k];
+                  },
+                  1e-6),
               1.0 / m);
       }
     }
@@ -233,9 +256,15 @@ TEST_CASE("recorded expressions give the same numbers") {
         case Operation::Constant: x.push_back(o.value); break;
         case Operation::Sin: x.push_back(std::sin(q[o.a])); break;
         case Operation::Cos: x.push_back(std::cos(q[o.a])); break;
-        case Operation::Add: x.push_back(x.at(static_cast<std::size_t>(o.a)) + x.at(static_cast<std::size_t>(o.b))); break;
-        case Operation::Subtract: x.push_back(x.at(static_cast<std::size_t>(o.a)) - x.at(static_cast<std::size_t>(o.b))); break;
-        case Operation::Multiply: x.push_back(x.at(static_cast<std::size_t>(o.a)) * x.at(static_cast<std::size_t>(o.b))); break;
+        case Operation::Add:
+          x.push_back(x.at(static_cast<std::size_t>(o.a)) + x.at(static_cast<std::size_t>(o.b)));
+          break;
+        case Operation::Subtract:
+          x.push_back(x.at(static_cast<std::size_t>(o.a)) - x.at(static_cast<std::size_t>(o.b)));
+          break;
+        case Operation::Multiply:
+          x.push_back(x.at(static_cast<std::size_t>(o.a)) * x.at(static_cast<std::size_t>(o.b)));
+          break;
       }
     }
     std::vector<double> out;
@@ -250,13 +279,15 @@ TEST_CASE("recorded expressions give the same numbers") {
       const int count = sets.residuals(q, r);
       const std::vector<double> got = run(sets.residual_tape(), q), minors = run(sets.manipulability_tape(), q);
       REQUIRE(static_cast<int>(got.size()) == count);
-      for (int i = 0; i < count; ++i) CHECK(std::abs(got[static_cast<std::size_t>(i)] - r[static_cast<std::size_t>(i)]) < 1e-15);
+      for (int i = 0; i < count; ++i)
+        CHECK(std::abs(got[static_cast<std::size_t>(i)] - r[static_cast<std::size_t>(i)]) < 1e-15);
       // Many turns away, and so many that the library's sine takes over.
       JointVector far = q;
       for (int i = 0; i < far.size(); ++i) far[i] += random.uniform(-1.0, 1.0) * (trial % 2 ? 9e4 : 1e9);
       sets.residuals(far, r);
       const std::vector<double> there = run(sets.residual_tape(), far);
-      for (int i = 0; i < count; ++i) CHECK(std::abs(there[static_cast<std::size_t>(i)] - r[static_cast<std::size_t>(i)]) < 1e-14);
+      for (int i = 0; i < count; ++i)
+        CHECK(std::abs(there[static_cast<std::size_t>(i)] - r[static_cast<std::size_t>(i)]) < 1e-14);
       double square = 0.0;
       for (const double m : minors) square += m * m;
       CHECK(std::abs(std::sqrt(square) - sets.manipulability(q)) < 1e-15);

@@ -1,4 +1,5 @@
-// VelocitySolver: what it says of its answers, posture, units, symmetries, bad input; and that it leaves the heap alone.
+// VelocitySolver: what it says of its answers, posture, units, symmetries, bad input; and that it leaves the heap
+// alone.
 
 #include <doctest/doctest.h>
 
@@ -403,8 +404,8 @@ TEST_CASE("random arms of 1 to 9 joints: regular directions are exact") {
     const double length_scale = random.decades(-1.0, 1.0);
     const VectorXd twist = random.vector(6);
     for (const Method& method :
-         {Method(JParse{0.1, 2.0, 0.5}), Method(JacobianProjection{}), Method(JacobianSafety{}), Method(PseudoInverse{}),
-          Method(AdaptiveDampedLeastSquares{}), Method(JacobianSafetyProjection{})}) {
+         {Method(JParse{0.1, 2.0, 0.5}), Method(JacobianProjection{}), Method(JacobianSafety{}),
+          Method(PseudoInverse{}), Method(AdaptiveDampedLeastSquares{}), Method(JacobianSafetyProjection{})}) {
       VelocitySolver solver(method, length_scale);
       const Solution s = solver.solve(state.jacobian, twist, JointVector(random.vector(n)));
       VectorXd missed = s.achieved_twist - twist;
@@ -442,8 +443,14 @@ TEST_CASE("the watch on the heap sees what it should") {
   };
   CHECK(seen([] {}) == 0);
   CHECK(seen([] { const std::unique_ptr<volatile int> p(new volatile int(1)); }) == 2);
-  CHECK(seen([] { const auto p = std::make_unique<std::string>(100, 'x'); CHECK(p->size() == 100); }) >= 4);
-  CHECK(seen([] { const VectorXd x = VectorXd::Constant(7, 1.0); CHECK(x.sum() == 7.0); }) >= 2);
+  CHECK(seen([] {
+          const auto p = std::make_unique<std::string>(100, 'x');
+          CHECK(p->size() == 100);
+        }) >= 4);
+  CHECK(seen([] {
+          const VectorXd x = VectorXd::Constant(7, 1.0);
+          CHECK(x.sum() == 7.0);
+        }) >= 2);
   volatile std::size_t size = 64;
   CHECK(seen([&] { std::free(std::malloc(size)); }) == 2);
   CHECK(seen([&] { std::free(std::calloc(size, 2)); }) == 2);

@@ -93,7 +93,8 @@ MatrixXd random_matrix(Random& random, Kind kind, int m, int n) {
       return rank == 0 ? MatrixXd(MatrixXd::Zero(m, n)) : MatrixXd(random.matrix(m, rank) * random.matrix(rank, n));
     }
     case Repeated: return random.with_singular_values(m, n, VectorXd::Constant(k, random.decades(-3, 3)));
-    case Mixed: return random.with_singular_values(m, n, test::random_singular_values(random, k, random.decades(-3, 3)));
+    case Mixed:
+      return random.with_singular_values(m, n, test::random_singular_values(random, k, random.decades(-3, 3)));
     case Graded: {
       VectorXd values(k);
       for (int i = 0; i < k; ++i) values[i] = std::pow(10.0, -4.0 * i);

@@ -47,9 +47,7 @@ struct Wander {
       phase[i] = random.uniform(0.0, 6.0);
     }
   }
-  Twist coordinates(double t) const {
-    return Twist(amplitude.array() * (frequency.array() * t + phase.array()).sin());
-  }
+  Twist coordinates(double t) const { return Twist(amplitude.array() * (frequency.array() * t + phase.array()).sin()); }
   Pose pose(double t) const {
     const Twist x = coordinates(t);
     Pose out = home;
@@ -311,7 +309,8 @@ TEST_CASE("a stream that stops: coasts for the horizon, and rests from the timeo
     for (; now < 5.0; now += 1e-3) {
       target = stream.at(now);
       CHECK((target.twist - before.twist).norm() < 0.1);
-      if (target.status == StreamStatus::Stale && mode != StreamMode::Interpolate) CHECK(now - last >= options.timeout - 1e-9);
+      if (target.status == StreamStatus::Stale && mode != StreamMode::Interpolate)
+        CHECK(now - last >= options.timeout - 1e-9);
       before = target;
     }
     CHECK(target.status == StreamStatus::Stale);
@@ -338,8 +337,10 @@ TEST_CASE("outliers leave no trace; a run of them that agree is believed") {
         CHECK(spoilt.push(now, wander.pose(now)) == SampleStatus::Accepted);
       } else if (cycle % 30 == 10) {
         Pose wrong = wander.pose(now);
-        if (cycle % 60 == 10) wrong.translation() += random.uniform(0.2, 3.0) * random.unit(3);
-        else wrong.linear() = rotation_exp(random.uniform(1.0, 3.1) * random.unit(3)) * wrong.linear();
+        if (cycle % 60 == 10)
+          wrong.translation() += random.uniform(0.2, 3.0) * random.unit(3);
+        else
+          wrong.linear() = rotation_exp(random.uniform(1.0, 3.1) * random.unit(3)) * wrong.linear();
         CHECK(spoilt.push(now, wrong) == SampleStatus::Outlier);
       }
       CHECK(clean.at(now).pose.matrix() == spoilt.at(now).pose.matrix());

@@ -76,8 +76,7 @@ TEST_CASE("a solver with a task: as masked by hand, and as given masked already"
     const Task task = task_of(static_cast<unsigned>(random.integer(1, 63)),
                               random.chance(0.5) ? Frame::Base : Frame::Tool);
     const int n = random.integer(1, 9);
-    const MatrixXd j =
-        random.with_singular_values(6, n, test::random_singular_values(random, std::min(6, n), 1.0));
+    const MatrixXd j = random.with_singular_values(6, n, test::random_singular_values(random, std::min(6, n), 1.0));
     const VectorXd twist = random.vector(6);
     const Eigen::Matrix3d rotation = random.rotation();
     const double length_scale = random.decades(-1.0, 1.0);

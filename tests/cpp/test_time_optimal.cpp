@@ -78,7 +78,9 @@ JointVector between(Random& random, const JointVector& lower, const JointVector&
 // The largest violation of dynamics, ends and limits.
 double violation(const Chain& chain, const TimeOptimalProblem& problem, const TimeOptimalResult& r) {
   const int n = chain.dof(), nodes = static_cast<int>(r.q.size()) / n;
-  const auto row = [n](const std::vector<double>& x, int k) { return Eigen::Map<const Eigen::VectorXd>(x.data() + k * n, n); };
+  const auto row = [n](const std::vector<double>& x, int k) {
+    return Eigen::Map<const Eigen::VectorXd>(x.data() + k * n, n);
+  };
   const double h = r.duration / nodes;
   const JointLimits& l = chain.limits();
   double worst = 0.0;
@@ -114,13 +116,15 @@ double objective(const TimeOptimalResult& r, int n, const TimeOptimalOptions& op
   return sum;
 }
 
-// Stationarity, without the method's own linear algebra: over all motions that keep dynamics and ends, and that stay off
-// the limits which this one touches, the objective's gradient vanishes but for what pushes into these limits. The motions
-// are parametrised by (h, q̈_0 … q̈_{N-2}); limits and ends give one row each; multipliers by non-negative least squares.
+// Stationarity, without the method's own linear algebra: over all motions that keep dynamics and ends, and that stay
+// off the limits which this one touches, the objective's gradient vanishes but for what pushes into these limits. The
+// motions are parametrised by (h, q̈_0 … q̈_{N-2}); limits and ends give one row each; multipliers by non-negative least
+// squares.
 struct Kkt {
   double residual;  // of the gradient, relative to its largest entry
 };
-Kkt stationarity(const Chain& chain, const TimeOptimalResult& r, const TimeOptimalOptions& options, const JointCost* cost) {
+Kkt stationarity(const Chain& chain, const TimeOptimalResult& r, const TimeOptimalOptions& options,
+                 const JointCost* cost) {
   const int n = chain.dof(), nodes = options.nodes, size = 1 + n * (nodes - 1);
   const double h = r.duration / nodes;
   const JointLimits& l = chain.limits();
@@ -235,7 +239,10 @@ TEST_CASE("constraints hold, the objective is what is said, and the motion is st
       options.time_weight = trial % 2 ? 600.0 : 1.0;
       options.nodes = trial % 3 ? 30 : 17;
       TimeOptimalProblem problem{between(random, chain.limits().lower, chain.limits().upper),
-                                 between(random, chain.limits().lower, chain.limits().upper), {}, {}, {}};
+                                 between(random, chain.limits().lower, chain.limits().upper),
+                                 {},
+                                 {},
+                                 {}};
       std::shared_ptr<Hills> hills;
       if (trial >= 4) {
         std::vector<Hills::Hill> list;
@@ -333,7 +340,9 @@ TEST_CASE("a node on top of a hill does not stay there") {
 
 TEST_CASE("what is refused") {
   const Chain chain = row_of_joints(3, 1.0, 1.0, 5.0);
-  const auto refuse = [&](const TimeOptimalOptions& options) { CHECK_THROWS_AS(TimeOptimal(chain, nullptr, options), Error); };
+  const auto refuse = [&](const TimeOptimalOptions& options) {
+    CHECK_THROWS_AS(TimeOptimal(chain, nullptr, options), Error);
+  };
   refuse({.nodes = 4});
   refuse({.time_weight = 0.0});
   refuse({.effort_weight = -1.0});

@@ -33,10 +33,10 @@ std::string link(const std::string& name, const std::string& inside = "") {
   return "<link name='" + name + "'>" + inside + "</link>\n";
 }
 
-std::string joint(const std::string& name, const std::string& type, const std::string& parent,
-                  const std::string& child, const std::string& inside) {
-  return "<joint name='" + name + "' type='" + type + "'><parent link='" + parent + "'/><child link='" + child +
-         "'/>" + inside + "</joint>\n";
+std::string joint(const std::string& name, const std::string& type, const std::string& parent, const std::string& child,
+                  const std::string& inside) {
+  return "<joint name='" + name + "' type='" + type + "'><parent link='" + parent + "'/><child link='" + child + "'/>" +
+         inside + "</joint>\n";
 }
 
 const std::string kLimit = "<limit lower='-1' upper='2' velocity='3' effort='4'/>";
@@ -173,7 +173,8 @@ TEST_CASE("names") {
 TEST_CASE("bytes that are not UTF-8") {
   // Comments may be; names may not, and a message that quotes them stays UTF-8, as Python needs it.
   CHECK(Chain::from_urdf("<!-- Andr\xE9 -->" + arm(kLimit)).dof() == 2);
-  for (const std::string bad : {"\xE9", "\xC3", "\xC0\x80", "\xE0\x80\x80", "\xED\xA0\x80", "\xF4\x90\x80\x80", "\x80"}) {
+  for (const std::string bad :
+       {"\xE9", "\xC3", "\xC0\x80", "\xE0\x80\x80", "\xED\xA0\x80", "\xF4\x90\x80\x80", "\x80"}) {
     check_facts(refusal(robot(link("a" + bad))), {"line 2", "<link> is not UTF-8"});
     check_facts(refusal(arm("<origin xyz='" + bad + "'/>" + kLimit)), {"<origin xyz=\"?"});
   }
@@ -189,9 +190,9 @@ TEST_CASE("what is not a tree") {
   check_facts(refusal(sprout(link("b"))), {"not one tree", "'base', 'b'"});
   check_facts(refusal(sprout(joint("j3", "fixed", "tip", "base", ""))), {"no root", "loop"});
   check_facts(refusal(sprout(joint("j3", "fixed", "base", "tip", ""))), {"'tip'", "two joints, 'j2' and 'j3'"});
-  check_facts(refusal(sprout(link("x") + link("y") + joint("j3", "fixed", "x", "y", "") +
-                             joint("j4", "fixed", "y", "x", ""))),
-              {"loop apart from the root 'base'", "'x', 'y'"});
+  check_facts(
+      refusal(sprout(link("x") + link("y") + joint("j3", "fixed", "x", "y", "") + joint("j4", "fixed", "y", "x", ""))),
+      {"loop apart from the root 'base'", "'x', 'y'"});
   check_facts(refusal(sprout(link("x") + joint("j3", "fixed", "x", "x", ""))), {"loop", "'x'"});
   check_facts(refusal(sprout(joint("j3", "fixed", "ghost", "tip", ""))), {"'j3'", "parent 'ghost'"});
   check_facts(refusal(sprout(joint("j3", "fixed", "tip", "ghost", ""))), {"'j3'", "child 'ghost'"});
@@ -235,8 +236,7 @@ TEST_CASE("joints that an arm cannot have") {
   check_facts(refusal(arm("", "floating")), {"'j2'", "floating"});
   check_facts(refusal(arm("", "planar")), {"'j2'", "planar"});
   check_facts(refusal(arm(kLimit, "spherical")), {"urdfdom", "[j2]", "[spherical]"});
-  check_facts(refusal(robot(link("a") + link("b") +
-                            "<joint name='j'><parent link='a'/><child link='b'/></joint>")),
+  check_facts(refusal(robot(link("a") + link("b") + "<joint name='j'><parent link='a'/><child link='b'/></joint>")),
               {"joint [j] has no type"});
   check_facts(refusal(arm(kLimit + "<mimic joint='j1' multiplier='2'/>")), {"'j2' mimics joint 'j1'"});
   check_facts(refusal(robot(link("a") + link("b") + joint("j", "fixed", "a", "b", ""))),
@@ -428,23 +428,25 @@ TEST_CASE("origins are exact") {
     for (double& a : rpy) a = i % 2 == 0 ? angle(random) : common[random() % common.size()];
     for (double& x : xyz) x = length(random);
     std::array<char, 300> text;
-    std::snprintf(text.data(), text.size(), "<origin xyz='%.17g %.17g %.17g' rpy='%.17g %.17g %.17g'/>", xyz[0],
-                  xyz[1], xyz[2], rpy[0], rpy[1], rpy[2]);
+    std::snprintf(text.data(), text.size(), "<origin xyz='%.17g %.17g %.17g' rpy='%.17g %.17g %.17g'/>", xyz[0], xyz[1],
+                  xyz[2], rpy[0], rpy[1], rpy[2]);
     const sigmaik::Pose origin = Chain::from_urdf(arm(text.data() + kLimit)).segments()[1].origin;
     CHECK(origin.translation() == Eigen::Vector3d(xyz[0], xyz[1], xyz[2]));
-    worst = std::max(worst, static_cast<double>((origin.linear().cast<long double>() - exact_rotation(rpy))
-                                                    .cwiseAbs().maxCoeff()));
+    worst = std::max(
+        worst, static_cast<double>((origin.linear().cast<long double>() - exact_rotation(rpy)).cwiseAbs().maxCoeff()));
   }
   MESSAGE("largest error of an entry: ", worst);
   CHECK(worst < 5e-16);
 }
 
 TEST_CASE("damaged files are read or refused, nothing else") {
-  const std::string whole =
-      robot(link("base") + link("a", "<inertial><mass value='1'/><inertia ixx='1' ixy='0' ixz='0' iyy='1' iyz='0' "
-                                     "izz='1'/></inertial>") +
-            link("tip") + joint("j1", "revolute", "base", "a", "<origin xyz='0 0 1' rpy='1 2 3'/>" + kLimit) +
-            joint("j2", "continuous", "a", "tip", "<axis xyz='0 1 0'/>"));
+  const std::string whole = robot(link("base") +
+                                  link("a",
+                                       "<inertial><mass value='1'/><inertia ixx='1' ixy='0' ixz='0' iyy='1' iyz='0' "
+                                       "izz='1'/></inertial>") +
+                                  link("tip") +
+                                  joint("j1", "revolute", "base", "a", "<origin xyz='0 0 1' rpy='1 2 3'/>" + kLimit) +
+                                  joint("j2", "continuous", "a", "tip", "<axis xyz='0 1 0'/>"));
   std::mt19937_64 random(99);
   int read = 0, refused = 0;
   for (int i = 0; i < 5000; ++i) {

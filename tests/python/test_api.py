@@ -288,9 +288,7 @@ def test_wrong_sizes_never_crash(shape):
             what(np.zeros(shape))
 
 
-@pytest.mark.parametrize(
-    "wrong", [None, "q", object(), {}, [None] * 6, ["a"] * 6, [[1], [2, 3]], np.zeros(6, complex)]
-)
+@pytest.mark.parametrize("wrong", [None, "q", object(), {}, [None] * 6, ["a"] * 6, [[1], [2, 3]], np.zeros(6, complex)])
 def test_what_is_not_numbers_is_refused(wrong):
     chain = sk.robots.load("ur10")
     for what in (chain.pose, chain.jacobian, chain.jacobian_gradient):
@@ -343,9 +341,7 @@ def test_rotations_are_scipys():
         R = Rotation.from_rotvec(vector).as_matrix()
         np.testing.assert_allclose(sk.rotation_exp(vector), R, rtol=0, atol=4e-15)
         np.testing.assert_allclose(sk.rotation_log(R), vector, rtol=0, atol=1e-14)
-        np.testing.assert_allclose(
-            sk.rotation_log(R), Rotation.from_matrix(R).as_rotvec(), rtol=0, atol=1e-14
-        )
+        np.testing.assert_allclose(sk.rotation_log(R), Rotation.from_matrix(R).as_rotvec(), rtol=0, atol=1e-14)
 
 
 def test_half_turns():
@@ -366,9 +362,7 @@ def test_pose_error():
         a[:3, :3], b[:3, :3] = Rotation.random(2, random_state=rng).as_matrix()
         a[:3, 3], b[:3, 3] = rng.normal(size=(2, 3))
         expected = (Rotation.from_matrix(b[:3, :3]) * Rotation.from_matrix(a[:3, :3]).inv()).as_rotvec()
-        np.testing.assert_allclose(
-            sk.pose_error(a, b), [*(b[:3, 3] - a[:3, 3]), *expected], rtol=0, atol=1e-12
-        )
+        np.testing.assert_allclose(sk.pose_error(a, b), [*(b[:3, 3] - a[:3, 3]), *expected], rtol=0, atol=1e-12)
     for wrong in (np.eye(3), np.zeros((4, 4)), None, 2 * np.eye(4)):
         with pytest.raises(sk.Error, match="current"):
             sk.pose_error(wrong, np.eye(4))

@@ -44,9 +44,7 @@ def test_bit_for_bit_a_loop_of_fresh_solvers(method):
     for m in range(1, 7):
         for n in (1, 2, 3, 6, 7, 8, 9, 16):
             J, twist = problem(10 * m + n, 12, m, n)
-            expected = [
-                sk.VelocitySolver(method, 0.6).solve(j, x).qdot for j, x in zip(J, twist, strict=True)
-            ]
+            expected = [sk.VelocitySolver(method, 0.6).solve(j, x).qdot for j, x in zip(J, twist, strict=True)]
             for threads in (1, 2, 5, 12, 13, 1000):
                 qdot = sk.solve_batch(method, J, twist, length_scale=0.6, threads=threads)
                 assert qdot.shape == (12, n)

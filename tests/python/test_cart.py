@@ -1,10 +1,12 @@
-"""Cart motions: the paper's experiment, optimality, an independent solver, refusals, whole trajectories, the command."""
+"""Cart motions: the paper's experiment, optimality, an independent solver, refusals, whole trajectories, the
+command."""
 
 import csv
 import math
 
 import numpy as np
 import pytest
+
 import sigmaik as sk
 from sigmaik import _core
 from sigmaik.cli import main
@@ -13,7 +15,8 @@ from sigmaik.planning import CartError, cart_motion, cart_trajectory, evaluate_c
 
 quadprog = pytest.importorskip("quadprog")
 
-# Σ(Δx)² [mm²], highest cart position [m], touching samples, end of the region in s, top speed [mm/s], acceleration [mm/s²]
+# Σ(Δx)² [mm²], highest cart position [m], touching samples, end of the region in s, top speed [mm/s], acceleration
+# [mm/s²]
 REFERENCE = {
     "fk": (24.359793, 0.7781139, (2362, 3605), 0.794411, 2.31573, 0.13714),
     "paper": (36.072246, 0.8297348, (2378, 4177), 0.859339, 2.48162, 0.39435),
@@ -26,13 +29,17 @@ def taught(request):
 
 
 def exact(e, **options):
-    return cart_motion(e.flange_xy, 0.5, 0.75, 0.2, **{"turn": e.turn, "cart_range": (0, 1), "duration": 200.0, **options})
+    return cart_motion(
+        e.flange_xy, 0.5, 0.75, 0.2, **{"turn": e.turn, "cart_range": (0, 1), "duration": 200.0, **options}
+    )
 
 
 def wave(rng, samples, waves):
     s = np.linspace(0.0, 1.0, samples)
     a, b, f, g = rng.uniform(0, 6), rng.uniform(0, 6), rng.uniform(0.5, 1.5) * waves, rng.uniform(0, waves)
-    return np.column_stack([0.4 * np.sin(2 * np.pi * g * s + b) + rng.uniform(-1, 1) * s, np.cos(2 * np.pi * f * s + a)])
+    return np.column_stack(
+        [0.4 * np.sin(2 * np.pi * g * s + b) + rng.uniform(-1, 1) * s, np.cos(2 * np.pi * f * s + a)]
+    )
 
 
 # --- the experiment
@@ -104,7 +111,8 @@ def test_margin_keeps_off(taught):
 
 
 def quadratic_program(start, end, lower, upper, acceleration=math.inf, at_rest=False):
-    """min Σ(Δx)² over the samples between two ends, in a tube, with bounds on second differences; None if infeasible."""
+    """min Σ(Δx)² over the samples between two ends, in a tube, with bounds on second differences; None if
+    infeasible."""
     m = len(lower)
     n = m - 2
     hessian = 2.0 * (2.0 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1))
@@ -521,7 +529,10 @@ def test_command(tmp_path, capsys):
         assert float(rows["plane"]["energy"]) < float(rows["exact"]["energy"])
         assert int(rows["exact"]["inside"]) == 0
         assert int(rows["linear"]["inside"]) > 0
-    assert main(["cart", "--variant", "fk", "--method", "exact", "--samples", "100", "--no-plot", "--out", str(tmp_path)]) == 0
+    assert (
+        main(["cart", "--variant", "fk", "--method", "exact", "--samples", "100", "--no-plot", "--out", str(tmp_path)])
+        == 0
+    )
     assert capsys.readouterr().out.strip().splitlines()[-1] == str(tmp_path / "cart-fk.csv")
 
 

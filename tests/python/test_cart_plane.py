@@ -1,4 +1,5 @@
-"""A cart with two linear axes against closed forms, dynamic programming on a grid, a general solver, and the exact law of one."""
+"""A cart with two linear axes against closed forms, dynamic programming on a grid, a general solver, and the exact law
+of one."""
 
 import math
 
@@ -247,7 +248,11 @@ def test_a_general_solver_finds_nothing_better(limited):
             )  # fmt: skip
             there = whole(other.x)
             ok = other.success and apart(other.x).min() > -1e-7 and all(f(other.x).min() > -1e-7 for f in rows)
-            if ok and evaluate_cart_motion_plane(path, there, r).clearance > 0.9 * r and abs(turns(there, path) - best.turn) < 1:
+            if (
+                ok
+                and evaluate_cart_motion_plane(path, there, r).clearance > 0.9 * r
+                and abs(turns(there, path) - best.turn) < 1
+            ):
                 assert best.energy <= other.fun * (1 + 1e-5)
                 same += other.fun < best.energy * (1 + 1e-5)
     assert same > 8
@@ -278,7 +283,13 @@ def test_limits_in_range():
     keep = (e.flange_xy, (0.5, 0.0), (0.75, 0.0), 0.2)
     free = cart_motion_plane(*keep, turn=e.turn, duration=200.0)
     m = cart_motion_plane(
-        *keep, turn=e.turn, duration=200.0, max_acceleration=(1e-3, 2e-3), at_rest=True, y_range=(-0.04, 0.06), margin=0.01
+        *keep,
+        turn=e.turn,
+        duration=200.0,
+        max_acceleration=(1e-3, 2e-3),
+        at_rest=True,
+        y_range=(-0.04, 0.06),
+        margin=0.01,
     )
     assert np.all(m.max_acceleration <= [1e-3, 2e-3])
     assert np.all(np.abs(m.xy[1] - m.xy[0]) <= np.array([1e-3, 2e-3]) * (200.0 / 799) ** 2)

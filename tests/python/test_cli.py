@@ -41,7 +41,9 @@ def test_version(capsys):
     assert capsys.readouterr().out == f"sigmaik {sk.__version__}\n"
 
 
-@pytest.mark.parametrize("arguments", [[], ["reach", "--help"], ["limits", "--help"], ["cart", "--help"], ["info", "--help"]])
+@pytest.mark.parametrize(
+    "arguments", [[], ["reach", "--help"], ["limits", "--help"], ["cart", "--help"], ["info", "--help"]]
+)
 def test_help(capsys, arguments):
     with pytest.raises(SystemExit) as exit_:
         main(arguments)
@@ -161,17 +163,12 @@ def test_reach_refuses(capsys, arguments, message):
 
 def test_limits(capsys, tmp_path):
     out = tmp_path / "out"
-    arguments = (
-        "--robot franka_panda --rate 250 --seconds 2 --pace 0.1 --trials 1 --seed 3 --jerk 5000 --format npz"
-    )
+    arguments = "--robot franka_panda --rate 250 --seconds 2 --pace 0.1 --trials 1 --seed 3 --jerk 5000 --format npz"
     assert main(["limits", "--out", str(out), *arguments.split()]) == 0
     printed = capsys.readouterr().out.splitlines()
     assert printed[-1] == str(out / "franka_panda-limits.csv")
     assert len([line for line in printed if line.startswith("picture: ")]) == 3
-    assert (
-        max(len(line) for line in printed if not line.startswith(("picture:", "time series:", str(out))))
-        <= 100
-    )
+    assert max(len(line) for line in printed if not line.startswith(("picture:", "time series:", str(out)))) <= 100
     assert len(list(out.glob("*.png"))) == 3
     assert len(list(out.glob("*.npz"))) == 15
     with (out / "franka_panda-limits.csv").open(newline="") as stream:
@@ -184,9 +181,7 @@ def test_limits(capsys, tmp_path):
 
 
 def test_limits_without_pictures(capsys, tmp_path):
-    arguments = (
-        "--robot ur10 --method dls:damping=0.2 --rate 200 --seconds 1 --pace 0.05 --trials 1 --no-plot"
-    )
+    arguments = "--robot ur10 --method dls:damping=0.2 --rate 200 --seconds 1 --pace 0.05 --trials 1 --no-plot"
     assert main(["limits", "--out", str(tmp_path), *arguments.split()]) == 0
     assert "came" in capsys.readouterr().out
     assert [file.name for file in tmp_path.iterdir()] == ["ur10-limits.csv"]

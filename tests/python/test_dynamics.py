@@ -1,4 +1,5 @@
-"""The dynamics against Pinocchio and MuJoCo, on every shipped arm whose inertias are known, with and without payload."""
+"""The dynamics against Pinocchio and MuJoCo, on every shipped arm whose inertias are known, with and without
+payload."""
 
 import numpy as np
 import pytest

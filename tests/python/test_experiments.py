@@ -88,9 +88,7 @@ def test_jparse_reaches_what_can_be_reached_and_stretches_out_to_the_rest(path, 
 
 @pytest.mark.parametrize("limits", [False, True])
 def test_dls_keeps_an_error_at_reachable_targets_that_grows_with_the_damping(limits):
-    errors = [
-        settled(XARM, LINE, f"dls:damping={damping}", limits)[1:] for damping in (0.05, 0.1, 0.2, 0.4, 0.8)
-    ]
+    errors = [settled(XARM, LINE, f"dls:damping={damping}", limits)[1:] for damping in (0.05, 0.1, 0.2, 0.4, 0.8)]
     assert errors[0][0] > 1.0
     assert errors[0][1] > 1.0
     assert np.all(np.diff(errors, axis=0) > 0.0)
@@ -229,9 +227,7 @@ def test_paths_that_move_start_where_the_arm_is(robot, path):
     experiment = load(robot, path)
     assert experiment.path.duration == pytest.approx(sum(s.duration for s in experiment.path.segments))
     if experiment.path.start is not None and experiment.path.moves:
-        error = sk.pose_error(
-            experiment.chain.pose(experiment.start), experiment.path.segments[0].target(0.0)
-        )
+        error = sk.pose_error(experiment.chain.pose(experiment.start), experiment.path.segments[0].target(0.0))
         assert np.linalg.norm(error) < 1e-3
 
 
@@ -300,9 +296,7 @@ def test_settling_time():
 
 def test_deviation_is_the_distance_from_the_line():
     line = paths.Line(np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]))
-    np.testing.assert_allclose(
-        line.deviation(np.array([[1.0, 9.0, 0.0], [4.0, -2.0, 4.0]])), [0.0, 5.0], atol=1e-15
-    )
+    np.testing.assert_allclose(line.deviation(np.array([[1.0, 9.0, 0.0], [4.0, -2.0, 4.0]])), [0.0, 5.0], atol=1e-15)
 
 
 # --- methods by name
@@ -316,17 +310,13 @@ def test_method_names():
     settings = ex.Settings(gamma=0.2, singular_gain=3.0)
     assert ex.parse_method("jparse", settings).method.gain_linear == 3.0
     assert ex.parse_method("safety", settings).method.gamma == 0.2
-    assert ex.parse_method("adaptive-dls:rule=manipulability,relative=no").label.startswith(
-        "adaptive-dls:rule"
-    )
+    assert ex.parse_method("adaptive-dls:rule=manipulability,relative=no").label.startswith("adaptive-dls:rule")
     # Buss and Kim's 45° an update.
     assert ex.parse_method("sdls", ex.Settings(rate=50.0)).method.max_speed == pytest.approx(12.5 * math.pi)
 
 
 def test_lists_of_methods():
-    labels = [
-        m.label for m in ex.parse_methods(["jparse:gain_linear=2,gain_angular=2,dls:damping=0.8", "pinv"])
-    ]
+    labels = [m.label for m in ex.parse_methods(["jparse:gain_linear=2,gain_angular=2,dls:damping=0.8", "pinv"])]
     assert labels == ["jparse:gain_linear=2,gain_angular=2", "dls:damping=0.8", "pinv"]
     assert [m.label for m in ex.parse_methods(["all"])] == list(ex.ALL_METHODS)
     assert len(ex.parse_methods(["all", "jparse"])) == len(ex.ALL_METHODS)
@@ -365,9 +355,7 @@ def test_waypoints_from_files(tmp_path):
     np.testing.assert_allclose(path.segments[1].pose[:3, 3], [0.4, 0.1, 0.3])
 
     numbers = [0.4, 0.1, 0.3, 0.0, 0.5, 0.0, 1.5]
-    for i, content in enumerate(
-        ([numbers], {"waypoints": [dict(zip(paths.COLUMNS, numbers, strict=True), name="a")]})
-    ):
+    for i, content in enumerate(([numbers], {"waypoints": [dict(zip(paths.COLUMNS, numbers, strict=True), name="a")]})):
         file = tmp_path / f"way{i}.json"
         file.write_text(json.dumps(content))
         read = ex.read_waypoints(file)
@@ -443,9 +431,7 @@ def test_saved_runs_read_back(tmp_path):
     assert float(table[7]["error_rz"]) == run.pose_error[7, 5]
     with ex.save_summary(ex.summarize(run), tmp_path / "sum.csv").open(newline="") as stream:
         summary = list(csv.DictReader(stream))
-    assert [float(row["position_error"]) for row in summary] == [
-        row.position_error for row in ex.summarize(run)
-    ]
+    assert [float(row["position_error"]) for row in summary] == [row.position_error for row in ex.summarize(run)]
 
 
 def test_files_are_written_whole_or_not_at_all(tmp_path):

@@ -6,6 +6,7 @@ import threading
 import numpy as np
 import pytest
 import scipy.linalg
+
 import sigmaik as sk
 
 NAMES = ("manipulability", "condition_number", "min_singular_value", "geometry_aware")

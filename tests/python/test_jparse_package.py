@@ -66,9 +66,7 @@ def test_qdot_and_null_space():
         for continuous in (True, False):  # the same thing for unit gains
             solver = sk.VelocitySolver(sk.JParse(gamma, continuous=continuous))
             qdot = solver.solve(J, twist).qdot
-            np.testing.assert_allclose(
-                qdot, matrix @ twist, rtol=0, atol=1e-9 * scale * np.linalg.norm(twist)
-            )
+            np.testing.assert_allclose(qdot, matrix @ twist, rtol=0, atol=1e-9 * scale * np.linalg.norm(twist))
             if np.linalg.cond(J) < 1e6:
                 rest = solver.solve(J, twist, posture).qdot - qdot
                 np.testing.assert_allclose(rest, null_space @ posture, rtol=0, atol=1e-8)

@@ -5,6 +5,7 @@ import proxsuite
 import pytest
 import quadprog
 import scipy.optimize
+
 import sigmaik as sk
 
 

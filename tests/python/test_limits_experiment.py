@@ -89,13 +89,9 @@ def test_the_rule_alone_is_what_the_servo_does_without_limits():
     """The reference against which everything is measured, which is not the servo's own account."""
     for scenario in ex.SCENARIOS:
         for trace in drive("ufactory_xarm7", scenario, "none"):
-            np.testing.assert_allclose(
-                trace.achieved, trace.rule, rtol=0, atol=1e-9 * (1 + np.abs(trace.rule).max())
-            )
+            np.testing.assert_allclose(trace.achieved, trace.rule, rtol=0, atol=1e-9 * (1 + np.abs(trace.rule).max()))
             assert not trace.limited.any()
-            np.testing.assert_allclose(
-                trace.q[1:], trace.q[:-1] + trace.qdot / SHORT.rate, rtol=0, atol=1e-12
-            )
+            np.testing.assert_allclose(trace.q[1:], trace.q[:-1] + trace.qdot / SHORT.rate, rtol=0, atol=1e-12)
 
 
 def test_limited_is_where_the_tool_misses_the_rules_twist():
@@ -116,9 +112,7 @@ def test_a_figure_by_hand():
     ).with_limits(acceleration=10.0)
     settings = ex.LimitsSettings(rate=100.0)
     trial = limits_.Trial("t", np.zeros(1), np.zeros((4, 6)), (limits_.Phase("drive", 0, 4),))
-    experiment = ex.LimitsExperiment(
-        "one", chain, ex.parse_method("jparse"), settings, {"teleoperation": (trial,)}
-    )
+    experiment = ex.LimitsExperiment("one", chain, ex.parse_method("jparse"), settings, {"teleoperation": (trial,)})
     qdot = np.array([[1.0], [1.0], [0.0], [0.0]])
     q = np.array([[0.0], [0.01], [0.02], [0.02], [0.02]])
     rule = np.tile([0.0, 0.0, 0.0, 0.0, 0.0, 1.0], (4, 1))

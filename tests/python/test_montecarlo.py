@@ -7,6 +7,7 @@ import sys
 
 import numpy as np
 import pytest
+
 import sigmaik as sk
 from sigmaik.experiments import montecarlo as mc
 from sigmaik.experiments.montecarlo_paper import PAPER
@@ -37,7 +38,10 @@ def test_metrics(expected):
     assert row.m_avg == pytest.approx(m.mean())
     assert row.l_p == pytest.approx(sum(np.linalg.norm(b - a) for a, b in zip(path, path[1:], strict=False)))
     assert row.m_dense == plan.clearance.min_manipulability <= row.m_min + 1e-12
-    turns = [np.linalg.norm(sk.rotation_log(b @ a.T)) for a, b in zip(*(chain.pose(plan.q)[s, :3, :3] for s in (slice(-1), slice(1, None))), strict=True)]
+    turns = [
+        np.linalg.norm(sk.rotation_log(b @ a.T))
+        for a, b in zip(*(chain.pose(plan.q)[s, :3, :3] for s in (slice(-1), slice(1, None))), strict=True)
+    ]
     assert row.angle == pytest.approx(sum(turns))
 
 
@@ -75,7 +79,9 @@ def test_executors(tmp_path, expected, kind):
 def test_dask(tmp_path, expected):
     distributed = pytest.importorskip("distributed")
     with (
-        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None, host="127.0.0.1") as cluster,
+        distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, dashboard_address=None, host="127.0.0.1"
+        ) as cluster,
         distributed.Client(cluster) as client,
     ):
         rows = mc.run_study(STUDY, tmp_path / "a.csv", client.get_executor(), jobs=2)

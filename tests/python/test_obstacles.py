@@ -6,8 +6,9 @@ import threading
 
 import numpy as np
 import pytest
-import sigmaik as sk
 from scipy.optimize import minimize
+
+import sigmaik as sk
 
 P = sk.planning
 
@@ -88,7 +89,13 @@ def test_distances_in_closed_form():
     ]:
         assert box.distance(point) == pytest.approx(expected)
     can = P.Cylinder(radius=1.0, length=4.0, pose=np.eye(4))
-    for point, expected in [((0, 0, 0), -1.0), ((0, 0, 1.5), -0.5), ((3, 4, 0), 4.0), ((0, 0, 5), 3.0), ((3, 4, 5), 5.0)]:
+    for point, expected in [
+        ((0, 0, 0), -1.0),
+        ((0, 0, 1.5), -0.5),
+        ((3, 4, 0), 4.0),
+        ((0, 0, 5), 3.0),
+        ((3, 4, 5), 5.0),
+    ]:
         assert can.distance(point) == pytest.approx(expected)
     assert P.Sphere(radius=1.0, center=(1, 2, 2)).distance((0, 0, 0)) == pytest.approx(2.0)
 

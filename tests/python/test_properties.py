@@ -48,9 +48,7 @@ def random_urdf(rng, n, prismatic=0.2, size=1.0, base=None, signs=None):
     links = ["base", *(f"l{i}" for i in range(-1, n)), "tool"]
     joints = [f'<joint name="mount" type="fixed"><parent link="base"/><child link="l-1"/>{mount}</joint>']
     for i in range(n):
-        limit = (
-            '<limit lower="-10" upper="10" velocity="1000" effort="1"/>' if types[i] == "prismatic" else ""
-        )
+        limit = '<limit lower="-10" upper="10" velocity="1000" effort="1"/>' if types[i] == "prismatic" else ""
         joints.append(
             f'<joint name="j{i}" type="{types[i]}"><parent link="l{i - 1}"/><child link="l{i}"/>'
             f'<origin xyz="{vec(xyz[i])}" rpy="{vec(rpy[i])}"/><axis xyz="{vec(axes[i])}"/>{limit}</joint>'
@@ -59,9 +57,7 @@ def random_urdf(rng, n, prismatic=0.2, size=1.0, base=None, signs=None):
         f'<joint name="tool" type="fixed"><parent link="l{n - 1}"/><child link="tool"/>'
         f'<origin xyz="{vec(xyz[n])}" rpy="{vec(rpy[n])}"/></joint>'
     )
-    return (
-        "<robot name='random'>" + "".join(f'<link name="{x}"/>' for x in links) + "".join(joints) + "</robot>"
-    )
+    return "<robot name='random'>" + "".join(f'<link name="{x}"/>' for x in links) + "".join(joints) + "</robot>"
 
 
 def chains(seed, count, **options):
@@ -151,9 +147,7 @@ def test_the_joints_signs_do_not_matter():
             b = sk.VelocitySolver(method).solve(other.jacobian(signs * q), x, signs * posture)
             if on_edge(a, 0.05, 0.1, 0.2) or a.singular_values[-1] < 1e-6 * a.singular_values[0]:
                 continue
-            np.testing.assert_allclose(
-                signs * b.qdot, a.qdot, rtol=0, atol=1e-7 * (1 + np.linalg.norm(a.qdot))
-            )
+            np.testing.assert_allclose(signs * b.qdot, a.qdot, rtol=0, atol=1e-7 * (1 + np.linalg.norm(a.qdot)))
 
 
 @pytest.mark.parametrize("size", [1000.0, 0.1, 3.0, 10.0])
@@ -168,11 +162,7 @@ def test_metres_or_millimetres_small_arms_or_large(size):
         for method in METHODS:
             if isinstance(method, sk.AdaptiveDampedLeastSquares) and not method.relative:
                 continue
-            same = (
-                sk.DampedLeastSquares(method.damping * size)
-                if isinstance(method, sk.DampedLeastSquares)
-                else method
-            )
+            same = sk.DampedLeastSquares(method.damping * size) if isinstance(method, sk.DampedLeastSquares) else method
             a = sk.VelocitySolver(method, 0.4).solve(one.jacobian(q), x, posture)
             b = sk.VelocitySolver(same, 0.4 * size).solve(other.jacobian(q), scaled, posture)
             if on_edge(a, 0.05, 0.1, 0.2) or a.singular_values[-1] < 1e-6 * a.singular_values[0]:
@@ -266,10 +256,7 @@ def test_smooth_rules_are_smooth_along_an_arms_motion(method):
 
             def steps(count, chain=chain, a=a, b=b, x=x):
                 solver = sk.VelocitySolver(method)
-                qdot = [
-                    solver.solve(chain.jacobian(a * t + b * t * t), x).qdot
-                    for t in np.linspace(-0.5, 1, count)
-                ]
+                qdot = [solver.solve(chain.jacobian(a * t + b * t * t), x).qdot for t in np.linspace(-0.5, 1, count)]
                 return np.linalg.norm(np.diff(qdot, axis=0), axis=1).max()
 
             coarse, fine = steps(2001), steps(8001)
@@ -316,6 +303,4 @@ def test_small_integers_are_the_degenerate_case(J, scale):
     np.testing.assert_allclose(U[:, :k] * sigma @ V.T, J, rtol=0, atol=2e-14 * max(sigma[0], 1e-300))
     np.testing.assert_allclose(U.T @ U, np.eye(len(U)), atol=2e-14)
     np.testing.assert_allclose(V.T @ V, np.eye(k), atol=2e-14)
-    np.testing.assert_allclose(
-        sigma, np.linalg.svd(J, compute_uv=False), rtol=0, atol=2e-14 * max(sigma[0], 1e-300)
-    )
+    np.testing.assert_allclose(sigma, np.linalg.svd(J, compute_uv=False), rtol=0, atol=2e-14 * max(sigma[0], 1e-300))

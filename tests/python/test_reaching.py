@@ -4,6 +4,7 @@ import csv
 
 import numpy as np
 import pytest
+
 import sigmaik as sk
 from sigmaik.experiments import reaching as rc
 

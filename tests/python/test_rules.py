@@ -370,9 +370,7 @@ def test_sdls_is_buss_and_kims():
         m = rng.integers(1, 7)
         n = rng.integers(1, 17)
         k = min(m, n)
-        sigma = np.cumprod(rng.uniform(0.1, 0.9, k)) * 10 ** rng.uniform(
-            -1, 1
-        )  # apart: the basis matters to it
+        sigma = np.cumprod(rng.uniform(0.1, 0.9, k)) * 10 ** rng.uniform(-1, 1)  # apart: the basis matters to it
         if rng.random() < 0.3:
             sigma[-1] = 0.0
         J = with_singular_values(rng, m, n, sigma)

@@ -6,6 +6,7 @@ import pickle
 
 import numpy as np
 import pytest
+
 import sigmaik as sk
 from sigmaik.singularities.search import singular_configurations
 
@@ -167,13 +168,21 @@ def test_expressions_are_the_numbers(name):
     symbols = {"sin": casadi.sin, "cos": casadi.cos}
     potential = sk.singularities.symbolic_potential(sing, joints, 3.0, 50.0, exp=casadi.exp, **symbols)
     function = casadi.Function(
-        "f", [x], [potential, casadi.gradient(potential, x), sk.singularities.symbolic_manipulability_squared(sing, joints, **symbols)]
+        "f",
+        [x],
+        [
+            potential,
+            casadi.gradient(potential, x),
+            sk.singularities.symbolic_manipulability_squared(sing, joints, **symbols),
+        ],
     )
     for q in random_configurations(arm, 200):
         residuals = sk.singularities.symbolic_residuals(sing, list(q))
         assert [len(r) for r in residuals] == list(sing.codimensions)
         assert sum(residuals, []) == pytest.approx(sing.signed_residuals(q), abs=1e-14)
-        assert sk.singularities.symbolic_potential(sing, list(q), 3.0, 50.0) == pytest.approx(sing.potential(q, 3.0, 50.0))
+        assert sk.singularities.symbolic_potential(sing, list(q), 3.0, 50.0) == pytest.approx(
+            sing.potential(q, 3.0, 50.0)
+        )
         value, gradient, square = (np.asarray(casadi.DM(y)).ravel() for y in function(q))
         assert value[0] == pytest.approx(sing.potential(q, 3.0, 50.0), rel=1e-12)
         assert gradient == pytest.approx(sing.gradient(q, 3.0, 50.0), abs=1e-11 * (1.0 + np.abs(gradient).max()))

@@ -38,9 +38,7 @@ def test_spectrum_is_numpys_for_every_size():
                 J = rng.normal(size=(m, n)) * 10 ** rng.uniform(-100, 100)
                 U, sigma, V = sk.Spectrum().decompose(J)
                 assert (U.shape, sigma.shape, V.shape) == ((m, m), (k,), (n, k))
-                np.testing.assert_allclose(
-                    sigma, np.linalg.svd(J, compute_uv=False), rtol=0, atol=1e-14 * sigma[0]
-                )
+                np.testing.assert_allclose(sigma, np.linalg.svd(J, compute_uv=False), rtol=0, atol=1e-14 * sigma[0])
                 np.testing.assert_allclose(U.T @ U, np.eye(m), atol=1e-14)
                 np.testing.assert_allclose(V.T @ V, np.eye(k), atol=1e-14)
                 np.testing.assert_allclose(U[:, :k] * sigma @ V.T, J, rtol=0, atol=1e-14 * sigma[0])
@@ -174,9 +172,7 @@ def test_status_and_achieved_twist(method):
         twist *= 10 ** rng.uniform(-3, 0)
         s = sk.VelocitySolver(method).solve(J, twist)
         seen.add(s.status)
-        np.testing.assert_allclose(
-            s.achieved_twist, J @ s.qdot, rtol=0, atol=1e-13 * (1 + np.linalg.norm(s.qdot))
-        )
+        np.testing.assert_allclose(s.achieved_twist, J @ s.qdot, rtol=0, atol=1e-13 * (1 + np.linalg.norm(s.qdot)))
         missed = np.linalg.norm(s.achieved_twist - twist) / np.linalg.norm(twist)
         assert (s.status == sk.Status.OK) == (missed < 1e-9) or 3e-10 < missed < 3e-9
         assert s.status in (sk.Status.OK, sk.Status.DAMPED)
@@ -282,9 +278,7 @@ def test_what_is_not_finite_is_refused_with_its_place(bad):
     wrong[0] = bad
     with pytest.raises(sk.Error, match=r"posture\[0\]"):
         solver.solve(J, twist, wrong)
-    np.testing.assert_array_equal(
-        solver.solve(J, twist, posture).qdot, untouched.solve(J, twist, posture).qdot
-    )
+    np.testing.assert_array_equal(solver.solve(J, twist, posture).qdot, untouched.solve(J, twist, posture).qdot)
 
 
 @pytest.mark.parametrize("bad", [0.0, -1.0, np.nan, np.inf])

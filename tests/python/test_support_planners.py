@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import scipy.interpolate
 import scipy.optimize
+
 import sigmaik as sk
 from sigmaik import _core
 
@@ -22,7 +23,8 @@ def pairs(name, count, seed=0):
 
 
 def covariance(states):
-    """K̄ of the interior states, from the double integral that defines it: Brownian velocity, both end positions known."""
+    """K̄ of the interior states, from the double integral that defines it: Brownian velocity, both end positions
+    known."""
     s = np.linspace(0.0, 1.0, states)
     # Positions of an integrated Brownian motion from rest: cov(s, u) = s²(3u − s)/6, and a free first velocity.
     a, b = np.minimum.outer(s, s), np.maximum.outer(s, s)
@@ -178,7 +180,12 @@ def test_refusals(planner, change, text):
 
 @pytest.mark.parametrize(
     ("change", "text"),
-    [({"samples": 1}, "samples"), ({"deviation": 0.0}, "deviation"), ({"decay": 1.5}, "decay"), ({"temperature": 0.0}, "temper")],
+    [
+        ({"samples": 1}, "samples"),
+        ({"deviation": 0.0}, "deviation"),
+        ({"decay": 1.5}, "decay"),
+        ({"temperature": 0.0}, "temper"),
+    ],
 )
 def test_refusals_of_the_stochastic_one(change, text):
     home = sk.robots.home("franka_panda")
@@ -240,7 +247,9 @@ def test_what_touches_is_refused_or_fails(table):
         line = start + np.linspace(0, 1, 200)[:, None] * (goal - start)
         if np.min(sk.planning.min_distance(spheres, obstacles, line)) > -0.02:
             continue
-        plan = sk.planning.gradient(arm, start, goal, obstacles, spheres=spheres, obstacle_weight=1e-9, prior_weight=1e4)
+        plan = sk.planning.gradient(
+            arm, start, goal, obstacles, spheres=spheres, obstacle_weight=1e-9, prior_weight=1e4
+        )
         assert plan.status == "failed"
         assert plan.q.shape == (0, 7)
         assert plan.clearance is None
@@ -254,7 +263,8 @@ def test_restarts_where_the_straight_line_leads_into_an_obstacle(table):
     stuck = 0
     for start, goal in tasks:
         once, plan, again = (
-            sk.planning.gradient(arm, start, goal, obstacles, spheres=spheres, restarts=restarts) for restarts in (0, 8, 8)
+            sk.planning.gradient(arm, start, goal, obstacles, spheres=spheres, restarts=restarts)
+            for restarts in (0, 8, 8)
         )
         assert np.array_equal(plan.q, again.q)
         assert plan.status != "failed"

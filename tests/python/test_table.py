@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 import sigmaik as sk
 from sigmaik.experiments import around_table as at
 

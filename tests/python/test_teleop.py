@@ -10,9 +10,9 @@ import pytest
 
 import sigmaik as sk
 from sigmaik.cli import main
+from sigmaik.experiments.methods import ALL_METHODS
 from sigmaik.teleop import Episode, Session, Settings, devices, gauges
 from sigmaik.teleop.drill import ROBOTS, drill
-from sigmaik.experiments.methods import ALL_METHODS
 
 
 def until(condition, seconds=20.0):
@@ -167,7 +167,9 @@ def test_a_recording_has_every_cycle(episode):
     assert len(episode.runs) == 2
     for run in episode.runs:
         assert (np.diff(episode["cycle"][run]) == 1).all()
-        np.testing.assert_allclose(np.diff(episode["q"][run], axis=0), episode["qdot"][run][1:] * episode.dt, atol=1e-12)
+        np.testing.assert_allclose(
+            np.diff(episode["q"][run], axis=0), episode["qdot"][run][1:] * episode.dt, atol=1e-12
+        )
     assert set(episode["command"]) >= {sk.LoopCommand.POSE, sk.LoopCommand.TWIST, sk.LoopCommand.STALE}
     assert [s.method for s in episode.settings.values()][0] == "jparse"
     assert [s.method for s in episode.settings.values()][-1] == "dls:damping=0.05"
@@ -302,7 +304,9 @@ def test_a_gamepad(monkeypatch):
     reading = pad.read()
     assert pad.name == "gamepad fake"
     assert reading.held
-    np.testing.assert_array_equal(reading.twist, [1.0, 0.0, 0.0, 0.0, 0.0, 0.0])  # ahead; the dead zone swallows the rest
+    np.testing.assert_array_equal(
+        reading.twist, [1.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+    )  # ahead; the dead zone swallows the rest
 
 
 def test_a_gamepad_that_is_not_there_or_goes_away(monkeypatch):

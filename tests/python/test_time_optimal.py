@@ -5,6 +5,7 @@ import threading
 
 import numpy as np
 import pytest
+
 import sigmaik as sk
 from sigmaik.planning.time_optimal import time_optimal
 

@@ -138,8 +138,15 @@ def test_modes_rank_as_they_must(experiment):
     assert abs(rows["true", True].delay) < 0.02
     assert rows["true", False].delay == pytest.approx(0.2, abs=0.05)
     # A prediction makes up for the camera's delay, interpolation adds its own, and samples alone have both.
-    assert rows["true", True].delay < rows["predict", True].delay < rows["interpolate", True].delay < rows["raw", False].delay
-    order = [rows[key].position_mean for key in (("true", True), ("predict", True), ("interpolate", True), ("raw", False))]
+    assert (
+        rows["true", True].delay
+        < rows["predict", True].delay
+        < rows["interpolate", True].delay
+        < rows["raw", False].delay
+    )
+    order = [
+        rows[key].position_mean for key in (("true", True), ("predict", True), ("interpolate", True), ("raw", False))
+    ]
     assert order == sorted(order)
     # The raw samples' outliers went to the servo, the stream's did not.
     assert rows["predict", True].refused >= rows["predict", True].wrong > 0
@@ -235,7 +242,19 @@ def test_command(tmp_path, capsys):
 
 def test_command_without_pictures(tmp_path, capsys):
     file, _, _ = recording(tmp_path, "npz")
-    arguments = ["track", "--robot", "ur10", "--target", str(file), "--method", "sdls", "--mode", "hold", "--feedforward", "off"]
+    arguments = [
+        "track",
+        "--robot",
+        "ur10",
+        "--target",
+        str(file),
+        "--method",
+        "sdls",
+        "--mode",
+        "hold",
+        "--feedforward",
+        "off",
+    ]
     arguments += ["--outliers", "0", "--no-gap", "--format", "none", "--no-plot", "--out", str(tmp_path)]
     assert main(arguments) == 0
     assert capsys.readouterr().out.strip().splitlines()[-1] == str(tmp_path / "ur10-hand.csv")

@@ -4,8 +4,9 @@ import importlib.util
 
 import numpy as np
 import pytest
-import sigmaik as sk
 from PIL import Image
+
+import sigmaik as sk
 from sigmaik.console import MissingPackage
 
 plots = pytest.importorskip("sigmaik.plots")
@@ -142,7 +143,9 @@ def test_play_refuses(arm, plan):
     servo = sk.Servo(arm, sk.JParse())
     off = START + np.array([0.0, 0.0, 0.01, 0.0, 0.0, 0.0, 0.0])
     servo.reset(off)
-    with pytest.raises(ValueError, match=f"stands at {off[2]:.6g} in joint {arm.joint_names[2]}, the trajectory begins"):
+    with pytest.raises(
+        ValueError, match=f"stands at {off[2]:.6g} in joint {arm.joint_names[2]}, the trajectory begins"
+    ):
         sk.planning.play(plan, servo)
     np.testing.assert_array_equal(servo.q, off)
     servo.reset(START)

@@ -132,9 +132,7 @@ def reference(path, q):
             R = R @ turn(axis, next(q))
     pose = np.eye(4)
     pose[:3, :3], pose[:3, 3] = R, p
-    columns = [
-        np.r_[z, np.zeros(3)] if point is None else np.r_[np.cross(z, p - point), z] for point, z in axes
-    ]
+    columns = [np.r_[z, np.zeros(3)] if point is None else np.r_[np.cross(z, p - point), z] for point, z in axes]
     return pose, np.array(columns).T
 
 

@@ -36,24 +36,32 @@ using test::Random;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-constexpr double kTolerance = 1e-9;   // relative, of velocity, acceleration and jerk limits; positions get none
-constexpr double kDone = 1e-4;        // the servo's: a twist that misses this part of itself is done
-constexpr double kSnap = 2e-12;       // q + q̇ dt to this, times 1 + |q|
+constexpr double kTolerance = 1e-9;  // relative, of velocity, acceleration and jerk limits; positions get none
+constexpr double kDone = 1e-4;       // the servo's: a twist that misses this part of itself is done
+constexpr double kSnap = 2e-12;      // q + q̇ dt to this, times 1 + |q|
 
 double ulp(double x) { return std::nextafter(std::abs(x), kInfinity) - std::abs(x); }
 
 // ---- Counts ---------------------------------------------------------------------------------------------------------
 
 enum Failure {
-  kPosition, kVelocity, kAcceleration, kJerk,  // limits that could have been kept
-  kNotRecovered,                               // joint-cycles after the time by which an infeasible start is over
-  kNotFinite, kNotSum, kUnasked, kRefused, kAccepted, kReport,
+  kPosition,
+  kVelocity,
+  kAcceleration,
+  kJerk,          // limits that could have been kept
+  kNotRecovered,  // joint-cycles after the time by which an infeasible start is over
+  kNotFinite,
+  kNotSum,
+  kUnasked,
+  kRefused,
+  kAccepted,
+  kReport,
   kFailures
 };
 constexpr const char* kFailureNames[kFailures] = {
     "position limit broken", "velocity limit broken", "acceleration limit broken", "jerk limit broken",
-    "not back in time", "output not finite", "q is not q + dt qdot", "moved unasked", "good input refused",
-    "bad input accepted", "report contradicts itself"};
+    "not back in time",      "output not finite",     "q is not q + dt qdot",      "moved unasked",
+    "good input refused",    "bad input accepted",    "report contradicts itself"};
 
 struct Counts {
   long episodes = 0, cycles = 0, joint_cycles = 0, servo = 0, constrained = 0, analytic = 0, infeasible = 0;
@@ -263,8 +271,13 @@ struct Command {
 class Commander {
  public:
   Commander(Random& random, const Chain& chain, const JointVector& q, bool poses_only)
-      : random_(random), chain_(chain), goal_(q), policy_(random.integer(0, poses_only ? 4 : 10)),
-        dwell_(random.decades(0.0, 2.7)), size_(random.decades(-2.0, 1.0)), bad_(random.chance(0.2) ? 0.01 : 0.0) {
+      : random_(random),
+        chain_(chain),
+        goal_(q),
+        policy_(random.integer(0, poses_only ? 4 : 10)),
+        dwell_(random.decades(0.0, 2.7)),
+        size_(random.decades(-2.0, 1.0)),
+        bad_(random.chance(0.2) ? 0.01 : 0.0) {
     command_.pose = sigmaik::pose(chain, q);
     command_.kind = policy_ <= 4 ? Command::kPose : Command::kTwist;
     if (policy_ > 4) command_.twist = size_ * random.unit(6);
@@ -377,7 +390,7 @@ class Episode {
         if (tight || std::isinf(limits.acceleration[i])) limits.acceleration[i] = random_.decades(0.0, 3.0);
         if (jerk) limits.jerk[i] = random_.decades(1.0, 6.0);
       }
-      arm = random_.chance(0.2) ? its_chain
+      arm = random_.chance(0.2)   ? its_chain
             : random_.chance(0.2) ? its_chain.with_limits(random_limits(random_, its_chain, dt))
                                   : its_chain.with_limits(limits);
     } else {
@@ -394,17 +407,17 @@ class Episode {
     const int kind = random_.integer(0, 9);  // 0, 1: outside; 2: too fast; 3, 4: all zero; 5, 6: moving; else at rest
     for (int i = 0; i < n; ++i) {
       const JointLimits& c = chain.limits();
-      const Limits limits{holds[0] ? c.lower[i] : -kInfinity,
-                          holds[0] ? c.upper[i] : kInfinity,
-                          holds[1] ? c.velocity[i] : kInfinity,
-                          holds[2] ? c.acceleration[i] : kInfinity,
-                          holds[3] ? c.jerk[i] : kInfinity,
-                          std::isinf(c.velocity[i]) ? 0.01 : recovery_speed * c.velocity[i]};
+      const Limits limits{
+          holds[0] ? c.lower[i] : -kInfinity,   holds[0] ? c.upper[i] : kInfinity,
+          holds[1] ? c.velocity[i] : kInfinity, holds[2] ? c.acceleration[i] : kInfinity,
+          holds[3] ? c.jerk[i] : kInfinity,     std::isinf(c.velocity[i]) ? 0.01 : recovery_speed * c.velocity[i]};
       double v = 0.0, q = inside(random_, limits.lower, limits.upper);
       if (kind <= 1 && random_.chance(0.5)) {
         const double over = random_.decades(-6.0, 0.3);
-        if (limits.upper < kInfinity && random_.chance(0.5)) q = limits.upper + over;
-        else if (limits.lower > -kInfinity) q = limits.lower - over;
+        if (limits.upper < kInfinity && random_.chance(0.5))
+          q = limits.upper + over;
+        else if (limits.lower > -kInfinity)
+          q = limits.lower - over;
       }
       if (kind == 3 || kind == 4) q = 0.0;
       const double speed = std::min(limits.velocity, random_.decades(-1.0, 1.0));
@@ -555,8 +568,8 @@ class Episode {
           const TaskVector not_done = select_rows(o.task, state.tip.linear(), missed);
           if (!(not_done.norm() <= 2.0 * kDone * asked.norm())) fail(kReport);
         }
-        idle_ = command.bad || (twist && command.twist.isZero(0.0) && o.posture_gain == 0.0 &&
-                                (at_once || o.soft_start == 0.0));
+        idle_ = command.bad ||
+                (twist && command.twist.isZero(0.0) && o.posture_gain == 0.0 && (at_once || o.soft_start == 0.0));
         q_ = s.q;
         qdot_ = s.qdot;
       });

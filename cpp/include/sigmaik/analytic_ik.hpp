@@ -32,9 +32,9 @@ enum AnalyticSingularity : std::uint8_t {
 
 /// One posture of a pose.
 struct AnalyticBranch {
-  SixJoints q;                  ///< [rad]
-  bool within_limits = false;   ///< every joint within the chain's limits
-  std::uint8_t singular = 0;    ///< AnalyticSingularity bits
+  SixJoints q;                 ///< [rad]
+  bool within_limits = false;  ///< every joint within the chain's limits
+  std::uint8_t singular = 0;   ///< AnalyticSingularity bits
 };
 
 /// Answer of AnalyticIk::solve(). By value, no heap.
@@ -100,23 +100,23 @@ class AnalyticIk {
   friend struct AnalyticWalk;
 
   struct Shoulder {
-    Eigen::Matrix3d from_base;        // base axes to those of the shoulder: z along axis 1, axis 2 in the plane of x, z
-    Eigen::Vector3d origin;           // of joint 1, in the base [m]
-    double c12, s12;                  // of the angle from axis 1 to axis 2
-    double height;                    // of the wrist centre along axis 2, seen from joint 1's origin [m]
-    double x, y;                      // axis 2 in its normal plane, seen from joint 1's origin [m]
+    Eigen::Matrix3d from_base;  // base axes to those of the shoulder: z along axis 1, axis 2 in the plane of x, z
+    Eigen::Vector3d origin;     // of joint 1, in the base [m]
+    double c12, s12;            // of the angle from axis 1 to axis 2
+    double height;              // of the wrist centre along axis 2, seen from joint 1's origin [m]
+    double x, y;                // axis 2 in its normal plane, seen from joint 1's origin [m]
   };
   struct Elbow {
-    double upper, fore;               // lengths of the planar arm [m]
-    double zero2, zero3;              // angles of the planar arm at q = 0
-    double sign3;                     // of axis 3 along axis 2
+    double upper, fore;   // lengths of the planar arm [m]
+    double zero2, zero3;  // angles of the planar arm at q = 0
+    double sign3;         // of axis 3 along axis 2
   };
   struct Wrist {
-    Eigen::Matrix3d from_fore;        // axes of the forearm to those of the wrist: z along axis 4, axis 5 in x, z
-    double c45, s45, c56, s56;        // of the angles between the axes
+    Eigen::Matrix3d from_fore;            // axes of the forearm to those of the wrist: z along axis 4, axis 5 in x, z
+    double c45, s45, c56, s56;            // of the angles between the axes
     double c_sum, s_sum, c_diff, s_diff;  // of half their sum and half their difference
-    double zero5;                     // angle of the spherical triangle at q = 0
-    bool perpendicular;               // axis 5 to 4 and to 6
+    double zero5;                         // angle of the spherical triangle at q = 0
+    bool perpendicular;                   // axis 5 to 4 and to 6
   };
 
   Chain chain_;

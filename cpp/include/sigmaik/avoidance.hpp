@@ -1,7 +1,7 @@
 #pragma once
 /// \file avoidance.hpp
-/// A posture velocity that leads away from singularities: where an arm is redundant, the servo follows it without moving
-/// the tool.
+/// A posture velocity that leads away from singularities: where an arm is redundant, the servo follows it without
+/// moving the tool.
 
 #include <limits>
 #include <optional>
@@ -24,8 +24,8 @@ struct AvoidanceOptions {
   Avoid what = Avoid::None;
   double gain = 1.0;       ///< ≥ 0, q̇ = gain ∇m or −gain ∇Σφ
   double max_speed = 0.5;  ///< [rad/s or m/s] > 0, of the fastest joint: longer velocities are shortened to it
-  /// Lower and wider than a planner's: a velocity has to be felt before the set is there. φ is 1 on the set, and e^{-1} at
-  /// 1/√η₂ = 0.3 rad from it.
+  /// Lower and wider than a planner's: a velocity has to be felt before the set is there. φ is 1 on the set, and e^{-1}
+  /// at 1/√η₂ = 0.3 rad from it.
   Potential potential{.eta1 = 0.0, .eta2 = 10.0};
 };
 

@@ -20,9 +20,9 @@ const char* to_string(JointType type) noexcept;
 
 /// Mass distribution of a link. The tensor is about the centre of mass, in the link's axes.
 struct Inertia {
-  double mass = 0.0;                                       ///< [kg]
+  double mass = 0.0;                                         ///< [kg]
   Eigen::Vector3d center_of_mass = Eigen::Vector3d::Zero();  ///< [m], in the link frame
-  Eigen::Matrix3d tensor = Eigen::Matrix3d::Zero();        ///< [kg·m²]
+  Eigen::Matrix3d tensor = Eigen::Matrix3d::Zero();          ///< [kg·m²]
 };
 
 /// A joint and the link that it carries. The link frame is the joint frame after the motion:
@@ -31,15 +31,15 @@ struct Segment {
   std::string joint_name;
   std::string link_name;
   JointType type = JointType::Fixed;
-  Pose origin = Pose::Identity();                      ///< joint frame in the parent link, at q = 0
-  Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();     ///< in the joint frame; normalised by Chain
-  double lower = -std::numeric_limits<double>::infinity();         ///< [rad or m]
-  double upper = std::numeric_limits<double>::infinity();          ///< [rad or m]
-  double velocity = std::numeric_limits<double>::infinity();       ///< [rad/s or m/s], > 0
-  double acceleration = std::numeric_limits<double>::infinity();   ///< [rad/s² or m/s²], > 0
-  double jerk = std::numeric_limits<double>::infinity();           ///< [rad/s³ or m/s³], > 0
-  double effort = std::numeric_limits<double>::infinity();         ///< [N·m or N], > 0
-  std::optional<Inertia> inertia;                      ///< of the link, where it is known
+  Pose origin = Pose::Identity();                                 ///< joint frame in the parent link, at q = 0
+  Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();                ///< in the joint frame; normalised by Chain
+  double lower = -std::numeric_limits<double>::infinity();        ///< [rad or m]
+  double upper = std::numeric_limits<double>::infinity();         ///< [rad or m]
+  double velocity = std::numeric_limits<double>::infinity();      ///< [rad/s or m/s], > 0
+  double acceleration = std::numeric_limits<double>::infinity();  ///< [rad/s² or m/s²], > 0
+  double jerk = std::numeric_limits<double>::infinity();          ///< [rad/s³ or m/s³], > 0
+  double effort = std::numeric_limits<double>::infinity();        ///< [N·m or N], > 0
+  std::optional<Inertia> inertia;                                 ///< of the link, where it is known
 };
 
 /// Limits of the movable joints, base to tip, infinite where there is none.
@@ -73,8 +73,8 @@ class Chain {
   /// \param acceleration [rad/s² or m/s²], one a movable joint; empty: the URDF's own, where its <limit>
   ///     elements carry the attribute `acceleration` (our extension), else infinite
   /// \throws Error for anything that is not a usable serial arm, with the facts
-  static Chain from_urdf(const std::string& source, const std::string& base = "",
-                         const std::string& tip = "", const std::vector<double>& acceleration = {});
+  static Chain from_urdf(const std::string& source, const std::string& base = "", const std::string& tip = "",
+                         const std::vector<double>& acceleration = {});
 
   int dof() const noexcept { return model_->dof; }
   const std::string& base() const noexcept { return model_->base; }

@@ -1,21 +1,22 @@
 #pragma once
 /// \file constrained_ik.hpp
-/// Inverse kinematics as constrained least squares, after G. Schreiber, M. Otter, G. Hirzinger, "Solving the singularity
-/// problem of non-redundant manipulators by constraint optimization", IROS 1999. Equation numbers are theirs.
+/// Inverse kinematics as constrained least squares, after G. Schreiber, M. Otter, G. Hirzinger, "Solving the
+/// singularity problem of non-redundant manipulators by constraint optimization", IROS 1999. Equation numbers are
+/// theirs.
 ///
 /// In each cycle i the joints' step Δq from q_{i−1} minimises, over linearisations j = 1, 2, … at q_i^{(j−1)} (9)–(12),
 ///
 ///     |α e^ap|² + |β (J^ap Δq − Δx_d^ap)|² + |γ ϑ|²                        (24), (25), (34)
 ///
 /// where e^ex = 0 (26), inside the joints' limits (13)–(16), (27), (28). e = x − x_d* is the pose's error, in an exact
-/// part and an approximate part; x_d* = x_d − Δx_d ϑ is the target, slowed down by ϑ in [0, 1] (33). β is what keeps the
-/// joints from oscillating: without active limits an error decays by the factor β²/(α²+β²) a cycle.
+/// part and an approximate part; x_d* = x_d − Δx_d ϑ is the target, slowed down by ϑ in [0, 1] (33). β is what keeps
+/// the joints from oscillating: without active limits an error decays by the factor β²/(α²+β²) a cycle.
 ///
 /// Rotations are not linearised as if they were vectors: for φ = log(R R_dᵀ), φ̇ = J_l⁻¹(φ) ω, exactly, so that large
 /// errors converge as fast as small ones.
 ///
-/// Where not everything can be had, limits come first, then torques, then the exact part, then the largest errors allowed,
-/// then the rest: there is always an answer.
+/// Where not everything can be had, limits come first, then torques, then the exact part, then the largest errors
+/// allowed, then the rest: there is always an answer.
 
 #include <array>
 #include <cstdint>
@@ -35,16 +36,16 @@ namespace sigmaik {
 
 /// Settings of ConstrainedIk. Six numbers are one a row (vx, vy, vz, ωx, ωy, ωz), in the task's axes.
 struct ConstrainedIkOptions {
-  double dt = 1e-3;   ///< [s] > 0, from one step to the next
-  Task task{};        ///< rows that matter at all, and their axes
+  double dt = 1e-3;                                                  ///< [s] > 0, from one step to the next
+  Task task{};                                                       ///< rows that matter at all, and their axes
   std::array<bool, 6> exact{true, true, true, false, false, false};  ///< of these, the rows to be met exactly
-  Twist alpha = Twist::Ones();            ///< ≥ 0, weights of the error [1/m, 1/rad]
-  /// ≥ 0, weights of the error's change in a cycle [1/m, 1/rad]. Errors decay in about dt (α²+β²)/α²: 5 √(1 ms/dt) gives
-  /// 25 ms at any dt.
+  Twist alpha = Twist::Ones();                                       ///< ≥ 0, weights of the error [1/m, 1/rad]
+  /// ≥ 0, weights of the error's change in a cycle [1/m, 1/rad]. Errors decay in about dt (α²+β²)/α²: 5 √(1 ms/dt)
+  /// gives 25 ms at any dt.
   Twist beta = Twist::Constant(5.0);
-  std::optional<double> gamma{};          ///< > 0, weight of the time scaling ϑ; none: ϑ = 0
-  /// > 0, largest error of the approximate rows [m, rad], each for itself; infinite for none. Let go, and said so, where
-  /// it cannot be had together with the exact part.
+  std::optional<double> gamma{};  ///< > 0, weight of the time scaling ϑ; none: ϑ = 0
+  /// > 0, largest error of the approximate rows [m, rad], each for itself; infinite for none. Let go, and said so,
+  /// where it cannot be had together with the exact part.
   Twist max_error = Twist::Constant(std::numeric_limits<double>::infinity());
   int iterations = 2;          ///< ≥ 1, linearisations a step
   bool torque_limits = false;  ///< hold the chain's effort limits: M q̈ + C q̇ + g, with the inertias of the chain
@@ -66,17 +67,17 @@ const char* to_string(IkSource source) noexcept;
 
 /// Answer of a step. By value, no heap.
 struct ConstrainedIkStep {
-  JointVector q;                      ///< (n,) position command
-  JointVector qdot;                   ///< (n,) velocity command over the last dt
+  JointVector q;     ///< (n,) position command
+  JointVector qdot;  ///< (n,) velocity command over the last dt
   /// Ok: the target is met. Damped: not met, and no limit is to blame. Limited: a limit holds the step back. BadInput.
   Status status = Status::BadInput;
-  Twist error = Twist::Zero();        ///< [m, rad] tip minus target, after the step
-  Twist path_error = Twist::Zero();   ///< the same, of the target slowed down by ϑ; equal where ϑ = 0
-  double time_scale = 0.0;            ///< ϑ in [0, 1]: 0 as asked, 1 a complete stop; how hard the step is
-  std::uint16_t active = 0;           ///< bit i: a limit of joint i is active
-  bool torque_active = false;         ///< a torque limit is active, or cannot be met
-  bool error_active = false;          ///< max_error is active, or has been let go
-  bool exact_met = true;              ///< the exact part's linearised equations hold
+  Twist error = Twist::Zero();       ///< [m, rad] tip minus target, after the step
+  Twist path_error = Twist::Zero();  ///< the same, of the target slowed down by ϑ; equal where ϑ = 0
+  double time_scale = 0.0;           ///< ϑ in [0, 1]: 0 as asked, 1 a complete stop; how hard the step is
+  std::uint16_t active = 0;          ///< bit i: a limit of joint i is active
+  bool torque_active = false;        ///< a torque limit is active, or cannot be met
+  bool error_active = false;         ///< max_error is active, or has been let go
+  bool exact_met = true;             ///< the exact part's linearised equations hold
   IkSource used = IkSource::Optimised;
 };
 

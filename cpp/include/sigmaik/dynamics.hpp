@@ -1,6 +1,7 @@
 #pragma once
 /// \file dynamics.hpp
-/// Mass matrix, Coriolis and gravity torques of an arm with what it carries, by KDL's ChainDynParam and ChainIdSolver_RNE.
+/// Mass matrix, Coriolis and gravity torques of an arm with what it carries, by KDL's ChainDynParam and
+/// ChainIdSolver_RNE.
 
 #include <memory>
 #include <optional>
@@ -20,9 +21,9 @@ class Dynamics {
  public:
   /// \param gravity [m/s²], in base axes
   /// \param payload what the tip carries: centre of mass in the tip's frame, tensor about it in the tip's axes
-  /// \throws Error where a movable joint carries no link whose inertia is known, where gravity is not finite, or where the
-  ///     payload is no body: a mass below 0, a tensor that is not symmetric, or a principal moment beyond the sum of the
-  ///     other two
+  /// \throws Error where a movable joint carries no link whose inertia is known, where gravity is not finite, or where
+  ///     the payload is no body: a mass below 0, a tensor that is not symmetric, or a principal moment beyond the sum
+  ///     of the other two
   explicit Dynamics(const Chain& chain, const Eigen::Vector3d& gravity = {0.0, 0.0, -9.80665},
                     const std::optional<Inertia>& payload = std::nullopt);
   ~Dynamics();

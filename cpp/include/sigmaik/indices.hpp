@@ -2,10 +2,10 @@
 /// \file indices.hpp
 /// How far from singular: indices of a Jacobian and their gradients in the joints.
 ///
-/// All come from the singular values σ_1 ≥ … ≥ σ_m of an m×n Jacobian J; where n < m the missing ones are zero, as such a
-/// task cannot be done whole. Where an index is said to be infinite at a singularity, that is where σ_m ≤ 1e-14 σ_1, which
-/// is what rounding leaves of a zero. Lengths and angles mix in J: `length_scale` [m] says how much of a length weighs as much as
-/// one radian, as in VelocitySolver.
+/// All come from the singular values σ_1 ≥ … ≥ σ_m of an m×n Jacobian J; where n < m the missing ones are zero, as such
+/// a task cannot be done whole. Where an index is said to be infinite at a singularity, that is where σ_m ≤ 1e-14 σ_1,
+/// which is what rounding leaves of a zero. Lengths and angles mix in J: `length_scale` [m] says how much of a length
+/// weighs as much as one radian, as in VelocitySolver.
 
 #include <cstddef>
 #include <string>
@@ -20,8 +20,8 @@ enum class Index {
   Manipulability,    ///< √det(JJᵀ) = Π σ_i (Yoshikawa 1985)
   ConditionNumber,   ///< σ_1/σ_m, 1 at best, +inf at a singularity (the dexterity index of Petrović et al., eq. 5)
   MinSingularValue,  ///< σ_m
-  /// ‖log(Σ^{-1/2} JJᵀ Σ^{-1/2})‖_F², squared distance between ellipsoids in the affine-invariant metric, Σ = kI where no
-  /// other is given (Petrović et al., eqs. 8 to 12): 0 where JJᵀ = Σ, +inf at a singularity.
+  /// ‖log(Σ^{-1/2} JJᵀ Σ^{-1/2})‖_F², squared distance between ellipsoids in the affine-invariant metric, Σ = kI where
+  /// no other is given (Petrović et al., eqs. 8 to 12): 0 where JJᵀ = Σ, +inf at a singularity.
   GeometryAware,
 };
 
@@ -32,7 +32,7 @@ const char* to_string(Index index) noexcept;
 inline constexpr double kDefaultScale = 6.0;
 
 struct IndexOptions {
-  double k = kDefaultScale;   ///< > 0, of the geometry-aware index: Σ = kI
+  double k = kDefaultScale;  ///< > 0, of the geometry-aware index: Σ = kI
   /// (m, m) symmetric positive definite, Σ instead of kI; empty: kI.
   TaskMatrix sigma{};
   double length_scale = 1.0;  ///< [m] > 0
@@ -54,9 +54,9 @@ class IndexFunction {
   /// Of a chain at q (n,), with the gradient (n,) [per rad or m]. Real time.
   ///
   /// Closed form through ∂J/∂q: ∂σ_i/∂q_k = u_iᵀ ∂_kJ v_i. The gradient is always finite. Where an index is not
-  /// differentiable it is the slope along the u_i, v_i that the decomposition picked: at a repeated σ_min, and at σ_min = 0,
-  /// where the slope of |σ| has either sign. Where the index is +inf (condition number, geometry-aware, at a singularity)
-  /// nothing points out, and the gradient is zero.
+  /// differentiable it is the slope along the u_i, v_i that the decomposition picked: at a repeated σ_min, and at σ_min
+  /// = 0, where the slope of |σ| has either sign. Where the index is +inf (condition number, geometry-aware, at a
+  /// singularity) nothing points out, and the gradient is zero.
   double value(const Chain& chain, const JointRef& q, JointVector& gradient) const noexcept;
   /// The same, from J and its chain alone.
   double gradient(const Jacobian& jacobian, JointVector& gradient) const noexcept;
@@ -76,9 +76,9 @@ double min_singular_value(const TaskJacobianRef& jacobian) noexcept;
 /// Σ log²(σ_i²/k), +inf where a σ_i = 0.
 double geometry_aware(const TaskJacobianRef& jacobian, double k = kDefaultScale) noexcept;
 
-/// k of a chain: kDefaultScale where the largest eigenvalue of JJᵀ over the joint ranges stays below it by a tenth, else
-/// that eigenvalue times 1.1, so that the sphere Σ = kI holds every ellipsoid. Found by 1000 quasi-random configurations
-/// and an ascent from the best: the same on every machine, a few ms.
+/// k of a chain: kDefaultScale where the largest eigenvalue of JJᵀ over the joint ranges stays below it by a tenth,
+/// else that eigenvalue times 1.1, so that the sphere Σ = kI holds every ellipsoid. Found by 1000 quasi-random
+/// configurations and an ascent from the best: the same on every machine, a few ms.
 double reference_scale(const Chain& chain, double length_scale = 1.0);
 
 /// Values, and gradients where `gradient` is not null, at `count` configurations.

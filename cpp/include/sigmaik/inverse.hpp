@@ -77,8 +77,9 @@ struct JParse {
   /// The gain is K at σ_i = 0 and goes linearly to I at σ_i = γσ_max. false: K throughout, as published;
   /// with K ≠ I the answer then jumps at the threshold.
   bool continuous = true;
-  /// Whether the posture acts along singular directions, as far as J-PARSE's own inverse does not: I − J⁺J, whose p_i is
-  /// (σ_i/(γσ_max))². An arm that was stretched out then folds back to the side of its posture. false: p_i = 1, as published.
+  /// Whether the posture acts along singular directions, as far as J-PARSE's own inverse does not: I − J⁺J, whose p_i
+  /// is (σ_i/(γσ_max))². An arm that was stretched out then folds back to the side of its posture. false: p_i = 1, as
+  /// published.
   bool singular_posture = false;
 };
 
@@ -97,9 +98,9 @@ struct JacobianSafetyProjection {
   double gamma = 0.1;
 };
 
-using Method = std::variant<PseudoInverse, DampedLeastSquares, AdaptiveDampedLeastSquares,
-                            SelectivelyDampedLeastSquares, JParse, JacobianProjection, JacobianSafety,
-                            JacobianSafetyProjection>;
+using Method =
+    std::variant<PseudoInverse, DampedLeastSquares, AdaptiveDampedLeastSquares, SelectivelyDampedLeastSquares, JParse,
+                 JacobianProjection, JacobianSafety, JacobianSafetyProjection>;
 
 /// "PseudoInverse", …
 const char* name(const Method& method) noexcept;
@@ -112,8 +113,8 @@ void validate(const Method& method);
 struct Resolution {
   std::array<double, kMaxTask> speed{};      ///< g_i: q̇ = Σ g_i v_i; 0 beyond size()
   std::array<double, kMaxTask> projector{};  ///< p_i of the posture; 0 beyond size()
-  std::uint8_t singular = 0;  ///< bit i: the rule does not treat direction u_i as regular
-  bool exact = true;          ///< every direction that the command uses is done in full
+  std::uint8_t singular = 0;                 ///< bit i: the rule does not treat direction u_i as regular
+  bool exact = true;                         ///< every direction that the command uses is done in full
 };
 
 /// Applies the rule. Real time.

@@ -31,8 +31,7 @@ inline constexpr int kMaxInequalities = 32;  ///< rows of G
 /// Bounded, so none touches the heap.
 using UnknownVector = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, kMaxUnknowns, 1>;
 using RowVector = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, kMaxObjectives, 1>;
-using RowMatrix =
-    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, kMaxObjectives, kMaxUnknowns>;
+using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, kMaxObjectives, kMaxUnknowns>;
 
 /// The problem. A part that is empty is absent; the number of unknowns is that of the columns of A, C or G, or the size
 /// of the bounds.
@@ -58,7 +57,7 @@ enum class LeastSquaresStatus : std::int8_t {
 const char* to_string(LeastSquaresStatus status) noexcept;
 
 struct LeastSquaresSolution {
-  UnknownVector x;                                          ///< (n,) inside the bounds exactly
+  UnknownVector x;  ///< (n,) inside the bounds exactly
   LeastSquaresStatus status = LeastSquaresStatus::BadInput;
   int steps = 0;                ///< factorisations taken; 1 where the last active set still fits
   std::uint32_t at_lower = 0;   ///< bit i: the answer is held at lower[i]

@@ -41,8 +41,8 @@ namespace sigmaik {
 
 /// Settings of a LimitTracker.
 struct LimitOptions {
-  double dt = 1e-3;          ///< [s] > 0, from one cycle to the next
-  bool position = true;      ///< which limits are held
+  double dt = 1e-3;      ///< [s] > 0, from one cycle to the next
+  bool position = true;  ///< which limits are held
   bool velocity = true;
   bool acceleration = true;
   bool jerk = true;
@@ -77,9 +77,9 @@ class LimitTracker {
   /// \throws Error where a size is wrong or an entry is not finite
   void reset(const JointRef& q, const JointRef& qdot = JointVector());
 
-  /// Starts where another tracker of as many joints stands, in the midst of its motion: with its positions, velocities and,
-  /// of joints with a jerk limit there, accelerations. Limits that did not hold there hold as after a reset(). Where the
-  /// other has not started, nothing happens. Real time.
+  /// Starts where another tracker of as many joints stands, in the midst of its motion: with its positions, velocities
+  /// and, of joints with a jerk limit there, accelerations. Limits that did not hold there hold as after a reset().
+  /// Where the other has not started, nothing happens. Real time.
   /// \throws Error where the number of joints or dt differ
   void continue_from(const LimitTracker& other);
 
@@ -115,16 +115,16 @@ class LimitTracker {
   // Velocities are counted as they are, and all else in velocities and cycles: positions [1/dt], changes of velocity
   // a cycle, and changes of those.
   struct Joint {
-    double lower, upper;     // [rad or m]
-    double velocity;         // V
-    double acceleration;     // A dt
-    double braking;          // a hair less, to plan with
-    double jerk;             // J dt²
-    double recovery;         // [rad/s or m/s], infinite without a velocity limit
-    double change = 0.0;     // v_k − v_{k−1}
-    double slope = 0.0;      // of the stop that is kept, a cycle
+    double lower, upper;      // [rad or m]
+    double velocity;          // V
+    double acceleration;      // A dt
+    double braking;           // a hair less, to plan with
+    double jerk;              // J dt²
+    double recovery;          // [rad/s or m/s], infinite without a velocity limit
+    double change = 0.0;      // v_k − v_{k−1}
+    double slope = 0.0;       // of the stop that is kept, a cycle
     double next_slope = 0.0;  // of the same, a cycle later
-    double next = 0.0;       // its velocity then
+    double next = 0.0;        // its velocity then
   };
 
   template <int kPadded>

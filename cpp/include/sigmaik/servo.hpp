@@ -16,7 +16,8 @@
 
 namespace sigmaik {
 
-/// What gives way where a joint limit would be broken. While none would be, the rule's answer stands, to the last digit.
+/// What gives way where a joint limit would be broken. While none would be, the rule's answer stands, to the last
+/// digit.
 ///
 /// Position and velocity limits decide where the arm is heading. Acceleration and jerk limits decide how fast it gets
 /// there: in proportion, all joints together, from the last command towards the new one, so that the tool does not veer
@@ -24,25 +25,25 @@ namespace sigmaik {
 /// the best of it.
 enum class OnLimit {
   /// Other joints take over: of all that the limits allow, the velocities whose twist is nearest to the rule's, and of
-  /// these the nearest to the rule's own, to about 1e-5 of the twist away from singularities. A singular direction counts
-  /// as one at the rule's threshold, so that little is not made up for by much. J-PARSE's answer, so limited, still never
-  /// moves the tool away from its target where the limits allow to rest.
+  /// these the nearest to the rule's own, to about 1e-5 of the twist away from singularities. A singular direction
+  /// counts as one at the rule's threshold, so that little is not made up for by much. J-PARSE's answer, so limited,
+  /// still never moves the tool away from its target where the limits allow to rest.
   Redistribute,
   Scale,  ///< direction kept, speed given up: all joints slow down together
 };
 
 /// Settings of a Servo.
 struct ServoOptions {
-  double dt = 1e-3;            ///< [s] > 0, the time from one update to the next
-  double gain_linear = 5.0;    ///< [1/s] ≥ 0, position error to velocity
-  double gain_angular = 5.0;   ///< [1/s] ≥ 0, orientation error to angular velocity
-  double max_linear_error = 0.25;   ///< [m] > 0: longer position errors are shortened to it
-  double max_angular_error = 1.0;   ///< [rad] > 0: longer orientation errors are shortened to it
+  double dt = 1e-3;                ///< [s] > 0, the time from one update to the next
+  double gain_linear = 5.0;        ///< [1/s] ≥ 0, position error to velocity
+  double gain_angular = 5.0;       ///< [1/s] ≥ 0, orientation error to angular velocity
+  double max_linear_error = 0.25;  ///< [m] > 0: longer position errors are shortened to it
+  double max_angular_error = 1.0;  ///< [rad] > 0: longer orientation errors are shortened to it
   /// [s] ≥ 0: over this time after reset() a pose target's command is faded in. Twists are faded in only where reset()
   /// was told that the arm moves.
   double soft_start = 0.1;
-  JointVector posture{};       ///< (n,) nominal positions; empty: the positions given to reset()
-  double posture_gain = 0.0;   ///< [1/s] ≥ 0
+  JointVector posture{};      ///< (n,) nominal positions; empty: the positions given to reset()
+  double posture_gain = 0.0;  ///< [1/s] ≥ 0
   double posture_max_speed = std::numeric_limits<double>::infinity();  ///< [rad/s or m/s] > 0, a joint
   AvoidanceOptions avoid{};  ///< added to the posture's velocity: away from singularities, where the arm is redundant
   bool position_limits = true;  ///< which of the chain's limits are held; see limits.hpp
@@ -53,24 +54,24 @@ struct ServoOptions {
   OnLimit on_limit = OnLimit::Redistribute;
   /// Rows (vx, vy, vz, ωx, ωy, ωz), in the task's axes, that come before the others where Redistribute cannot do all.
   std::array<bool, 6> exact{};
-  double length_scale = 1.0;    ///< [m], see VelocitySolver
-  Task task{};                  ///< rows that matter
+  double length_scale = 1.0;  ///< [m], see VelocitySolver
+  Task task{};                ///< rows that matter
 };
 
 /// Answer of a cycle. By value, no heap.
 struct ServoStep {
-  JointVector q;                     ///< (n,) position command
-  JointVector qdot;                  ///< (n,) velocity command over the last dt
+  JointVector q;     ///< (n,) position command
+  JointVector qdot;  ///< (n,) velocity command over the last dt
   Status status = Status::BadInput;
-  Twist pose_error = Twist::Zero();  ///< target minus tip before the step, unshortened; zero for twist commands
+  Twist pose_error = Twist::Zero();      ///< target minus tip before the step, unshortened; zero for twist commands
   Twist asked_twist = Twist::Zero();     ///< what the rule was given: the twist command, or the pose error's
   Twist achieved_twist = Twist::Zero();  ///< J q̇
   /// In [0, 1], what limits left: of the rule's speed (Scale), or of its twist along itself (Redistribute).
   double scale = 1.0;
   std::uint16_t limiting_joints = 0;  ///< bit i: joint i is held at a limit that the rule's answer would break
-  TaskVector singular_values;        ///< of the weighted task Jacobian
-  std::uint8_t singular = 0;         ///< bit i: direction i is singular to the rule
-  int task_rows = 0;                 ///< m', the number of directions
+  TaskVector singular_values;         ///< of the weighted task Jacobian
+  std::uint8_t singular = 0;          ///< bit i: direction i is singular to the rule
+  int task_rows = 0;                  ///< m', the number of directions
 };
 
 /// Drives a chain's own reference configuration towards poses, or along twists. It integrates the command that it
@@ -101,9 +102,9 @@ class Servo {
   /// One cycle of the fastest stop that the limits allow, or of rest: Holding. Real time.
   ServoStep hold() noexcept { return stop(Status::Holding); }
 
-  /// Takes over from another servo of the same arm and dt, in the midst of its motion: rule and options are this one's, and
-  /// what it commands is faded in from the other's last velocity over soft_start. The posture is the other's unless one
-  /// was given. Where the other has not started, nothing happens. Real time.
+  /// Takes over from another servo of the same arm and dt, in the midst of its motion: rule and options are this one's,
+  /// and what it commands is faded in from the other's last velocity over soft_start. The posture is the other's unless
+  /// one was given. Where the other has not started, nothing happens. Real time.
   /// \throws Error where the number of joints or dt differ
   void continue_from(const Servo& other);
 

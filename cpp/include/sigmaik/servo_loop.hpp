@@ -7,8 +7,8 @@
 ///     loop.follow(target, 0.25);     // [s] until it is stale, and the arm stops, unless it is said again
 ///     loop.read(samples);            // what was done in each cycle, from any other thread
 ///
-/// Commands go in and samples come out without a lock in the loop: what commands it may hang, and the arm stops when its
-/// last command is stale. Late cycles are counted and left out, never made up for by a burst.
+/// Commands go in and samples come out without a lock in the loop: what commands it may hang, and the arm stops when
+/// its last command is stale. Late cycles are counted and left out, never made up for by a burst.
 
 #include <atomic>
 #include <cstdint>
@@ -25,7 +25,7 @@ namespace sigmaik {
 
 /// What a cycle followed.
 enum class LoopCommand : std::int8_t {
-  Hold = 0,   ///< nothing: the arm stops, or rests
+  Hold = 0,  ///< nothing: the arm stops, or rests
   FollowPose = 1,
   FollowTwist = 2,
   Stale = 3,  ///< a command that was not said again in time: as Hold
@@ -33,11 +33,11 @@ enum class LoopCommand : std::int8_t {
 
 /// What was done in one cycle.
 struct LoopSample {
-  std::int64_t cycle = 0;   ///< from 0, of those that ran
-  double time = 0.0;        ///< [s] since start()
+  std::int64_t cycle = 0;  ///< from 0, of those that ran
+  double time = 0.0;       ///< [s] since start()
   LoopCommand command = LoopCommand::Hold;
-  int configuration = 0;    ///< what configure() answered when this cycle's servo was given; 0: the first one
-  bool restarted = false;   ///< the arm was put where it is: see ServoLoop::configure
+  int configuration = 0;           ///< what configure() answered when this cycle's servo was given; 0: the first one
+  bool restarted = false;          ///< the arm was put where it is: see ServoLoop::configure
   Pose target = Pose::Identity();  ///< of the pose that is followed, else the tip's
   Pose tip = Pose::Identity();     ///< after the step, in base
   ServoStep step;
@@ -45,10 +45,10 @@ struct LoopSample {
 
 struct LoopStatistics {
   std::int64_t cycles = 0;
-  std::int64_t missed = 0;    ///< cycles left out, as their time had passed
-  std::int64_t unread = 0;    ///< samples lost, as nobody read them in time
-  double worst_delay = 0.0;   ///< [s] from when a cycle was due to its start
-  double elapsed = 0.0;       ///< [s] since start(), or from start() to stop()
+  std::int64_t missed = 0;   ///< cycles left out, as their time had passed
+  std::int64_t unread = 0;   ///< samples lost, as nobody read them in time
+  double worst_delay = 0.0;  ///< [s] from when a cycle was due to its start
+  double elapsed = 0.0;      ///< [s] since start(), or from start() to stop()
   double rate() const noexcept { return elapsed > 0.0 ? static_cast<double>(cycles) / elapsed : 0.0; }
 };
 

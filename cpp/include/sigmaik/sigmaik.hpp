@@ -25,16 +25,17 @@
 ///     analytic_ik.hpp      AnalyticIk: every posture of a pose, for six joints with a spherical wrist
 ///     dynamics.hpp         Dynamics: mass matrix, Coriolis, gravity, payload, by KDL (not included)
 ///     computed_torque.hpp  ComputedTorque: joint torques along a planned motion (not included)
-///     constrained_ik.hpp   ConstrainedIk: a pose exactly in part, the rest as limits allow; time scaling (not included)
-///     planning/time_optimal.hpp  TimeOptimal: motions within limits, away from what a cost marks (not included)
-///     planning/support_states.hpp  SupportPlanner: smooth motions along which a cost is low, by gradient or samples
-///     planning/batch_cost.hpp    BatchCost: a cost of all support states at once, such as a user's own (not included)
-///     planning/costs.hpp         costs for both: potentials, manipulability, geometry-aware index (not included)
-///     planning/cart.hpp          cart_law: where to drive the cart of a cart-mounted arm, clear of a cylinder (not included)
-///     planning/cart_plane.hpp    plane_cart_law: the same with two linear axes (not included)
+///     constrained_ik.hpp   ConstrainedIk: a pose exactly in part, the rest as limits allow; time scaling (not
+///     included) planning/time_optimal.hpp  TimeOptimal: motions within limits, away from what a cost marks (not
+///     included) planning/support_states.hpp  SupportPlanner: smooth motions along which a cost is low, by gradient or
+///     samples planning/batch_cost.hpp    BatchCost: a cost of all support states at once, such as a user's own (not
+///     included) planning/costs.hpp         costs for both: potentials, manipulability, geometry-aware index (not
+///     included) planning/cart.hpp          cart_law: where to drive the cart of a cart-mounted arm, clear of a
+///     cylinder (not included) planning/cart_plane.hpp    plane_cart_law: the same with two linear axes (not included)
 ///     planning/distance_field.hpp   DistanceField: signed distances to obstacles on a grid (not included)
-///     planning/arm_spheres.hpp      ArmSpheres: an arm as spheres, from a URDF's shapes or along its links (not included)
-///     planning/collision_costs.hpp  costs of obstacles, the arm itself, joint limits; min_distance (not included)
+///     planning/arm_spheres.hpp      ArmSpheres: an arm as spheres, from a URDF's shapes or along its links (not
+///     included) planning/collision_costs.hpp  costs of obstacles, the arm itself, joint limits; min_distance (not
+///     included)
 ///
 /// Set-up throws Error. Calls marked "real time" are noexcept, bounded, and touch neither heap nor lock.
 

@@ -3,9 +3,9 @@
 /// Known singular sets of three arms, potentials around them, and their manipulability in closed form
 /// (Beck et al. 2022, eqs. 14, 24 to 27, 33 to 37; corrected where they do not hold, and completed).
 ///
-/// A set is where all its residuals r vanish, trigonometric polynomials of the joint positions without a unit, scaled so
-/// that near the set ψ = Σ r² is about the squared distance in the joints' space. The number of residuals is the set's
-/// codimension: a set of codimension 1 is a wall, and r changes its sign across it; round others there is a way.
+/// A set is where all its residuals r vanish, trigonometric polynomials of the joint positions without a unit, scaled
+/// so that near the set ψ = Σ r² is about the squared distance in the joints' space. The number of residuals is the
+/// set's codimension: a set of codimension 1 is a wall, and r changes its sign across it; round others there is a way.
 
 #include <array>
 #include <memory>
@@ -18,8 +18,8 @@
 
 namespace sigmaik {
 
-inline constexpr int kMaxSets = 4;               ///< most sets of an arm
-inline constexpr int kMaxResiduals = 8;          ///< most residuals of an arm, all sets together
+inline constexpr int kMaxSets = 4;       ///< most sets of an arm
+inline constexpr int kMaxResiduals = 8;  ///< most residuals of an arm, all sets together
 inline constexpr int kMaxCodimension = 2;
 
 /// A singular set, described.

@@ -25,13 +25,13 @@ struct TargetStreamOptions {
   double max_angular_speed = 4.0;  ///< [rad/s] > 0
   /// [s] ≥ 0, time constant of the way from where the target is to where a new sample says it is; at 0 the twist jumps.
   double smoothing = 0.05;
-  double latency = 0.1;   ///< [s] ≥ 0, Interpolate plays so late: the sensor's delay, and one or two samples
-  double horizon = 0.1;   ///< [s] ≥ 0: so long after its last sample the target moves on as it did, …
-  double timeout = 0.3;   ///< [s] ≥ horizon, > 0: … and by then it has come to rest, and the stream is stale
-  double noise_linear = 2e-3;         ///< [m] > 0, standard deviation of a sample, each axis
-  double noise_angular = 1e-2;        ///< [rad] > 0
-  double acceleration_linear = 3.0;   ///< [m/s²] > 0, standard deviation of what the target may do between samples
-  double acceleration_angular = 10.0; ///< [rad/s²] > 0
+  double latency = 0.1;              ///< [s] ≥ 0, Interpolate plays so late: the sensor's delay, and one or two samples
+  double horizon = 0.1;              ///< [s] ≥ 0: so long after its last sample the target moves on as it did, …
+  double timeout = 0.3;              ///< [s] ≥ horizon, > 0: … and by then it has come to rest, and the stream is stale
+  double noise_linear = 2e-3;        ///< [m] > 0, standard deviation of a sample, each axis
+  double noise_angular = 1e-2;       ///< [rad] > 0
+  double acceleration_linear = 3.0;  ///< [m/s²] > 0, standard deviation of what the target may do between samples
+  double acceleration_angular = 10.0;  ///< [rad/s²] > 0
   int relocate = 5;  ///< ≥ 1: so many refused samples in a row that agree with each other are believed
 };
 
@@ -74,27 +74,29 @@ struct Target {
   double age = 0.0;  ///< [s] since the newest sample was taken; 0 before the first
 };
 
-/// The way from a sensor to a servo: samples come when they come, late, doubled, wrong or not at all; targets go out each
-/// cycle. They are continuous, with their twist, and never faster than max_speed and max_angular_speed: not when a sample
-/// arrives, not when the stream stops or starts again, not when the target is found elsewhere.
+/// The way from a sensor to a servo: samples come when they come, late, doubled, wrong or not at all; targets go out
+/// each cycle. They are continuous, with their twist, and never faster than max_speed and max_angular_speed: not when a
+/// sample arrives, not when the stream stops or starts again, not when the target is found elsewhere.
 ///
 ///     stream.push(stamp, pose);                    // whenever there is one: stamp = when it was taken
 ///     const Target target = stream.at(now);        // each cycle, on the same clock
 ///     servo.update(target.pose, target.twist);
 ///
-/// A sensor's delay needs no setting: Predict looks ahead from the stamp to now. Not to be shared between threads without a
-/// lock.
+/// A sensor's delay needs no setting: Predict looks ahead from the stamp to now. Not to be shared between threads
+/// without a lock.
 ///
-/// *Model.* The samples make a motion R(t): held, interpolated, or predicted. Interpolated is cubic between samples, in R³
-/// and in the chart φ = log(R R_aᵀ) of the earlier one, with the slopes of the parabola through three neighbours. Predicted
-/// is an extended Kalman filter for p, v and R, ω with ṗ = v, Ṙ = [ω]× R, errors p = p̂ + e, R = exp(η) R̂ (invariant under
-/// a change of base, Barrau and Bonnabel 2017), and an acceleration that is constant between samples. With noise that is alike
-/// in all directions, and to first order in the angle turned between samples, its covariances are 2×2 ⊗ I₃: one gain for
-/// place and one for velocity, linear and angular. After `horizon` without a sample, v and ω fade to rest by `timeout`.
+/// *Model.* The samples make a motion R(t): held, interpolated, or predicted. Interpolated is cubic between samples, in
+/// R³ and in the chart φ = log(R R_aᵀ) of the earlier one, with the slopes of the parabola through three neighbours.
+/// Predicted is an extended Kalman filter for p, v and R, ω with ṗ = v, Ṙ = [ω]× R, errors p = p̂ + e, R = exp(η) R̂
+/// (invariant under a change of base, Barrau and Bonnabel 2017), and an acceleration that is constant between samples.
+/// With noise that is alike in all directions, and to first order in the angle turned between samples, its covariances
+/// are 2×2 ⊗ I₃: one gain for place and one for velocity, linear and angular. After `horizon` without a sample, v and ω
+/// fade to rest by `timeout`.
 ///
 /// *Output.* The target is exp(d(t)) R(t), with the difference d from the motion decaying as d̈ = −2ḋ/τ − d/τ², τ the
-/// `smoothing`, from where it was, and as fast as it was, in the cycle before: so neither pose nor twist jump when a sample
-/// changes the motion. d is accelerated by the largest speed per τ at most, and steps beyond the largest speeds are shortened.
+/// `smoothing`, from where it was, and as fast as it was, in the cycle before: so neither pose nor twist jump when a
+/// sample changes the motion. d is accelerated by the largest speed per τ at most, and steps beyond the largest speeds
+/// are shortened.
 class TargetStream {
  public:
   /// \throws Error where an option is out of its range

@@ -30,8 +30,7 @@ struct Task {
 
 /// The rows of `rows` (6×k) that the task asks for, in the task's axes. Real time.
 /// \param rotation tip in base
-TaskJacobian select_rows(const Task& task, const Eigen::Matrix3d& rotation,
-                         const Jacobian& rows) noexcept;
+TaskJacobian select_rows(const Task& task, const Eigen::Matrix3d& rotation, const Jacobian& rows) noexcept;
 
 /// The same for a twist.
 TaskVector select_rows(const Task& task, const Eigen::Matrix3d& rotation, const Twist& twist) noexcept;

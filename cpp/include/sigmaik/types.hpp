@@ -16,18 +16,15 @@ inline constexpr int kMaxTask = 6;     ///< most task rows
 /// One number a joint: position [rad or m], velocity, … of up to 16 joints.
 using JointVector = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, kMaxJoints, 1>;
 /// Square in the joints, up to 16×16: a Hessian in q.
-using JointMatrix =
-    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kMaxJoints, kMaxJoints>;
+using JointMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kMaxJoints, kMaxJoints>;
 /// One number a task row, up to 6.
 using TaskVector = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, kMaxTask, 1>;
 /// Square in the task's rows, up to 6×6.
-using TaskMatrix =
-    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kMaxTask, kMaxTask>;
+using TaskMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kMaxTask, kMaxTask>;
 /// [v; ω], 6×n: row i is m/s or rad/s per unit joint speed.
 using Jacobian = Eigen::Matrix<double, 6, Eigen::Dynamic, Eigen::ColMajor, 6, kMaxJoints>;
 /// Any m×n with 1 ≤ m ≤ 6 and 1 ≤ n ≤ 16, for tasks that are not a whole twist.
-using TaskJacobian =
-    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kMaxTask, kMaxJoints>;
+using TaskJacobian = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kMaxTask, kMaxJoints>;
 /// [v; ω] in m/s and rad/s.
 using Twist = Eigen::Matrix<double, 6, 1>;
 /// Tip in base.

@@ -35,8 +35,8 @@ class VelocitySolver {
 
   /// Real time.
   ///
-  /// \param jacobian m×n, 1 ≤ m ≤ 6, 1 ≤ n ≤ 16. With six rows the task's mask and frame apply. With as many rows as the
-  ///     mask has, it is taken as masked already. Any other m needs a task that asks for everything; its rows
+  /// \param jacobian m×n, 1 ≤ m ≤ 6, 1 ≤ n ≤ 16. With six rows the task's mask and frame apply. With as many rows as
+  ///     the mask has, it is taken as masked already. Any other m needs a task that asks for everything; its rows
   ///     from the fourth on then count as angular.
   /// \param twist (m,) [m/s, rad/s]
   /// \param posture (n,) q̇_posture [rad/s or m/s]; empty: none

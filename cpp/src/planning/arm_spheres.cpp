@@ -76,7 +76,8 @@ std::vector<LinkSphere> without_inner(const std::vector<LinkSphere>& spheres) {
 
 }  // namespace
 
-ArmSpheres::ArmSpheres(const Chain& chain, std::vector<LinkSphere> spheres) : chain_(chain), spheres_(std::move(spheres)) {
+ArmSpheres::ArmSpheres(const Chain& chain, std::vector<LinkSphere> spheres)
+    : chain_(chain), spheres_(std::move(spheres)) {
   const std::vector<Segment>& segments = chain.segments();
   require(!spheres_.empty(), "an arm needs at least one sphere");
   require(spheres_.size() <= kMaxSpheres, "the arm has ", spheres_.size(), " spheres; at most ", kMaxSpheres,
@@ -90,7 +91,8 @@ ArmSpheres::ArmSpheres(const Chain& chain, std::vector<LinkSphere> spheres) : ch
             " m must be finite and greater than 0");
   }
 
-  // At q = 0 links' frames are products of origins, and joints' frames of the constants: what lies between the two stays.
+  // At q = 0 links' frames are products of origins, and joints' frames of the constants: what lies between the two
+  // stays.
   std::vector<Pose> to_joint{Pose::Identity()};  // of the base, then of each segment
   std::vector<int> moved{0};                     // by how many joints
   Pose link = Pose::Identity(), joint = Pose::Identity();
@@ -120,7 +122,9 @@ ArmSpheres ArmSpheres::from_urdf(const Chain& chain, const std::string& source, 
     switch (shape.kind) {
       case LinkShape::Kind::Box: cover_box(shape, spheres); break;
       case LinkShape::Kind::Cylinder: cover_cylinder(shape, spheres); break;
-      case LinkShape::Kind::Sphere: spheres.push_back({shape.segment, shape.origin.translation(), shape.size[0]}); break;
+      case LinkShape::Kind::Sphere:
+        spheres.push_back({shape.segment, shape.origin.translation(), shape.size[0]});
+        break;
       case LinkShape::Kind::Mesh:
         if (shape.origin.translation().isZero(0.0)) {
           cover_link(chain, shape.segment, radius, spheres);
@@ -168,7 +172,8 @@ void ArmSpheres::jacobian(int i, const SphereState& state, PointJacobian& jacobi
   }
 }
 
-void ArmSpheres::row(int i, const SphereState& state, const Eigen::Vector3d& direction, JointVector& row) const noexcept {
+void ArmSpheres::row(int i, const SphereState& state, const Eigen::Vector3d& direction,
+                     JointVector& row) const noexcept {
   const Eigen::Vector3d& center = state.center[static_cast<std::size_t>(i)];
   for (int k = 0; k < joints(i); ++k) {
     const std::size_t at = static_cast<std::size_t>(k);

@@ -1,8 +1,8 @@
 #pragma once
-// min Σ_i |x_{i+1} − x_i|² between given ends, x of one or more axes, under bounds on combinations of up to three entries, in
-// O(M) a step: a primal-dual interior-point method after Mehrotra, whose normal matrix has four diagonals for each axis beside
-// the main one. In long double: rows of second differences make fourth differences, whose condition is (M/π)⁴, 10¹³ for 5000
-// samples.
+// min Σ_i |x_{i+1} − x_i|² between given ends, x of one or more axes, under bounds on combinations of up to three
+// entries, in O(M) a step: a primal-dual interior-point method after Mehrotra, whose normal matrix has four diagonals
+// for each axis beside the main one. In long double: rows of second differences make fourth differences, whose
+// condition is (M/π)⁴, 10¹³ for 5000 samples.
 
 #include <algorithm>
 #include <array>
@@ -26,7 +26,8 @@ template <int kAxes>
 class BandQp {
  public:
   // pinned: axes that stay where the guess has them.
-  explicit BandQp(std::vector<BandRow> rows, std::array<bool, kAxes> pinned = {}) : rows_(std::move(rows)), pinned_(pinned) {}
+  explicit BandQp(std::vector<BandRow> rows, std::array<bool, kAxes> pinned = {})
+      : rows_(std::move(rows)), pinned_(pinned) {}
 
   // From a guess x (M ≥ 3 samples), whose ends stay. False where no x within the bounds was found; x is then of no use.
   bool solve(std::vector<double>& x) {
@@ -139,7 +140,8 @@ class BandQp {
 
   static void scatter(const BandRow& r, Real factor, std::vector<Real>& to) {
     for (int k = 0; k < r.count; ++k) {
-      to[static_cast<std::size_t>(r.first + k * r.stride)] += factor * static_cast<Real>(r.c[static_cast<std::size_t>(k)]);
+      to[static_cast<std::size_t>(r.first + k * r.stride)] += factor *
+                                                              static_cast<Real>(r.c[static_cast<std::size_t>(k)]);
     }
   }
 
@@ -181,7 +183,8 @@ class BandQp {
         const auto i = static_cast<std::size_t>(r.first + k * r.stride);
         const Real wc = w * static_cast<Real>(r.c[static_cast<std::size_t>(k)]);
         for (int l = k; l < r.count; ++l) {
-          band_[i][static_cast<std::size_t>((l - k) * r.stride)] += wc * static_cast<Real>(r.c[static_cast<std::size_t>(l)]);
+          band_[i][static_cast<std::size_t>((l - k) * r.stride)] += wc *
+                                                                    static_cast<Real>(r.c[static_cast<std::size_t>(l)]);
         }
       }
     }
@@ -228,7 +231,7 @@ class BandQp {
   }
 
   // How far s or z can go before one is 0; at most a thousand.
-  Real longest(Real Bound::*at, Real Bound::*by) const {
+  Real longest(Real Bound::* at, Real Bound::* by) const {
     Real far = 1000;
     for (const Bound& b : bounds_) {
       if (b.*by < 0) far = std::min<Real>(far, -(b.*at) / (b.*by));

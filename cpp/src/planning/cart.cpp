@@ -17,9 +17,9 @@ using sigmaik::detail::require;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kPi = 3.14159265358979323846;
-constexpr double kNear = 1e-6;  // [samples] a tip keeps away from the samples beside it
+constexpr double kNear = 1e-6;    // [samples] a tip keeps away from the samples beside it
 constexpr double kLongest = 1e6;  // times the duration, where limits of acceleration are too tight
-constexpr int kLeap = 16;       // points inside a region that lies between two samples
+constexpr int kLeap = 16;         // points inside a region that lies between two samples
 
 struct GridPoint {
   double px, py;        // P [m]
@@ -145,7 +145,8 @@ class Funnel {
     while (own.size() > 1 && !below<-kSign>(own.points[own.points.size() - 2], own.points.back(), p)) {
       own.points.pop_back();
     }
-    while (own.size() == 1 && other.size() > 1 && below<kSign>(other.points[other.head], other.points[other.head + 1], p)) {
+    while (own.size() == 1 && other.size() > 1 &&
+           below<kSign>(other.points[other.head], other.points[other.head + 1], p)) {
       const Point& corner = other.points[++other.head];
       own.begin(corner);
       corners.push_back(corner.index);
@@ -168,7 +169,11 @@ struct Outcome {
 class Search {
  public:
   Search(const PlanarPath& path, double start, double end, double r, const CartOptions& options)
-      : grid_(make_grid(path, r)), start_(start), end_(end), r_(r), options_(options),
+      : grid_(make_grid(path, r)),
+        start_(start),
+        end_(end),
+        r_(r),
+        options_(options),
         top_slope_(options.max_speed * options.duration / static_cast<double>(path.rows() - 1)) {
     if (options.turn) turns_ = static_cast<int>(std::lround((*options.turn - ends_turn()) / (2.0 * kPi)));
   }
@@ -239,7 +244,8 @@ class Search {
       if (at_start * at_end < 0) {
         out.fault = CartFault::OppositeSides;
         out.facts = message("the cart starts ", at_start > 0 ? "above" : "below", " the forbidden region and ends ",
-                            at_end > 0 ? "above" : "below", " it, but the region has no gap from the first to the last sample");
+                            at_end > 0 ? "above" : "below",
+                            " it, but the region has no gap from the first to the last sample");
         return false;
       }
       const int side = at_start != 0 ? at_start : at_end;
@@ -315,8 +321,8 @@ class Search {
     return x_[k] > grid_.points[k].px ? 1 : -1;
   }
 
-  // Whether the sides still open leave room for the turn asked for. P's azimuth goes over the half-line of π where the cart
-  // passes above a part in which y changes its sign, and nowhere else.
+  // Whether the sides still open leave room for the turn asked for. P's azimuth goes over the half-line of π where the
+  // cart passes above a part in which y changes its sign, and nowhere else.
   bool can_turn(const std::vector<signed char>& sides) const {
     int least = 0, most = 0;
     for (std::size_t j = 0; j < sides.size(); ++j) {
@@ -327,7 +333,8 @@ class Search {
     return least <= turns_ && turns_ <= most;
   }
 
-  // The part to branch on where the string is in none, but does not turn as asked: that with the least way to its other side.
+  // The part to branch on where the string is in none, but does not turn as asked: that with the least way to its other
+  // side.
   int to_turn(const std::vector<signed char>& sides) const {
     int missing = turns_, nearest = -1;
     for (std::size_t j = 0; j < sides.size(); ++j) missing -= passes(j) > 0 ? grid_.extents[j].winding : 0;
@@ -409,7 +416,8 @@ class Search {
     }
     for (std::size_t j = 0; j < grid_.extents.size(); ++j) {
       const Extent& e = grid_.extents[j];
-      law.regions.push_back({grid_.at[static_cast<std::size_t>(e.first)], grid_.at[static_cast<std::size_t>(e.last)], passes(j)});
+      law.regions.push_back(
+          {grid_.at[static_cast<std::size_t>(e.first)], grid_.at[static_cast<std::size_t>(e.last)], passes(j)});
     }
     law.turn = turn();
     law.strings = strings_;
@@ -443,9 +451,10 @@ double top_acceleration(const VectorXd& x, double dt, bool at_rest) {
   return top / (dt * dt);
 }
 
-// The law of the least energy on the sides of `law`, within speed and acceleration [m per sample, m per sample²]. False where
-// there is none.
-bool accelerate(const PlanarPath& path, double r, const CartOptions& options, double speed, double acceleration, CartLaw& law) {
+// The law of the least energy on the sides of `law`, within speed and acceleration [m per sample, m per sample²]. False
+// where there is none.
+bool accelerate(const PlanarPath& path, double r, const CartOptions& options, double speed, double acceleration,
+                CartLaw& law) {
   const Grid grid = make_grid(path, r);
   const int m = static_cast<int>(law.x.size());
   if (m < 3) return false;
@@ -509,8 +518,9 @@ void explain(const PlanarPath& path, double start, double end, double r, const C
   without = solve(path, start, end, r, o);
   if (!without.fault) {
     out.fault = CartFault::Range;
-    out.facts = message("a turn of ", options.turn.value_or(kNaN), " rad needs the cart from ", without.law.x.minCoeff(), " to ",
-                        without.law.x.maxCoeff(), " m, out of its range [", options.lower, ", ", options.upper, "] m");
+    out.facts = message("a turn of ", options.turn.value_or(kNaN), " rad needs the cart from ",
+                        without.law.x.minCoeff(), " to ", without.law.x.maxCoeff(), " m, out of its range [",
+                        options.lower, ", ", options.upper, "] m");
     return;
   }
   out.fault = CartFault::Winding;
@@ -546,7 +556,8 @@ void check(const PlanarPath& path, double start, double end, double radius, cons
             o.upper, "] m");
   }
   require(!o.turn || std::abs(*o.turn) <= 1e6, "turn = ", o.turn.value_or(kNaN), " rad must be within a million");
-  require(std::isfinite(o.duration) && o.duration > 0.0, "duration = ", o.duration, " s must be finite and greater than 0");
+  require(std::isfinite(o.duration) && o.duration > 0.0, "duration = ", o.duration,
+          " s must be finite and greater than 0");
   require(o.max_speed > 0.0, "max_speed = ", o.max_speed, " m/s must be greater than 0");
   require(o.max_acceleration > 0.0, "max_acceleration = ", o.max_acceleration, " m/s² must be greater than 0");
   require(o.max_strings >= 1, "max_strings = ", o.max_strings, " must be at least 1");
@@ -607,8 +618,8 @@ CartLaw cart_law(const PlanarPath& path, double start, double end, double radius
     const auto within = [&](double longer) {
       constexpr double kInside = 1.0 - 1e-9;
       const double step = longer * dt;
-      return accelerate(path, r, options, kInside * options.max_speed * step, kInside * options.max_acceleration * step * step,
-                        out.law);
+      return accelerate(path, r, options, kInside * options.max_speed * step,
+                        kInside * options.max_acceleration * step * step, out.law);
     };
     if (within(1.0)) return std::move(out.law);
     double good = 2.0, bad = 1.0;
@@ -620,13 +631,15 @@ CartLaw cart_law(const PlanarPath& path, double start, double end, double radius
       const double middle = 0.5 * (good + bad);
       (within(middle) ? good : bad) = middle;
     }
-    throw CartError(CartFault::Acceleration, kNaN,
-                    message("no cart motion (acceleration): on the sides of the shortest way none keeps to ", options.max_acceleration,
-                            " m/s²", options.at_rest ? " from rest to rest" : "",
-                            good < kLongest ? message("; a duration of ", good * options.duration, " s would do") : ""));
+    throw CartError(
+        CartFault::Acceleration, kNaN,
+        message("no cart motion (acceleration): on the sides of the shortest way none keeps to ",
+                options.max_acceleration, " m/s²", options.at_rest ? " from rest to rest" : "",
+                good < kLongest ? message("; a duration of ", good * options.duration, " s would do") : ""));
   }
   if (*out.fault == CartFault::Winding) explain(path, start, end, r, options, out);
-  const double feasible = *out.fault == CartFault::Undecided ? kNaN : feasible_radius(path, start, end, radius, options);
+  const double feasible = *out.fault == CartFault::Undecided ? kNaN
+                                                             : feasible_radius(path, start, end, radius, options);
   std::string text = message("no cart motion (", to_string(*out.fault), "): ", out.facts);
   if (std::isfinite(feasible)) {
     text += message("; with a radius up to ", feasible, " m there is one");
@@ -638,8 +651,8 @@ CartLaw cart_law(const PlanarPath& path, double start, double end, double radius
 
 int cart_descent(const VectorRef& lower, const VectorRef& upper, VectorXd& x, const CartDescent& o) {
   const Eigen::Index m = x.size();
-  require(m >= 2 && lower.size() == m && upper.size() == m, "lower, upper and x have ", lower.size(), ", ", upper.size(),
-          " and ", m, " entries; they need the same number, at least 2");
+  require(m >= 2 && lower.size() == m && upper.size() == m, "lower, upper and x have ", lower.size(), ", ",
+          upper.size(), " and ", m, " entries; they need the same number, at least 2");
   require(x.allFinite(), "the first guess must be finite");
   require(std::isfinite(o.alpha) && o.alpha > 0.0, "alpha = ", o.alpha, " must be finite and greater than 0");
   require(std::isfinite(o.step) && o.step > 0.0, "step = ", o.step, " must be finite and greater than 0");

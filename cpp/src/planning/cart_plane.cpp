@@ -19,19 +19,19 @@ using sigmaik::detail::require;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kPi = 3.14159265358979323846;
-constexpr int kCoarse = 121;        // samples where starts are compared
-constexpr int kForks = 4;           // places where the straight motion is taken round either side
-constexpr int kAzimuths = 32;       // places on the disc's border that dynamic programming goes through
-constexpr int kSheetsAside = 3;     // turns that it counts either way
-constexpr double kLeap = 0.9;       // of the radius: a step that comes nearer leaps over the disc
+constexpr int kCoarse = 121;     // samples where starts are compared
+constexpr int kForks = 4;        // places where the straight motion is taken round either side
+constexpr int kAzimuths = 32;    // places on the disc's border that dynamic programming goes through
+constexpr int kSheetsAside = 3;  // turns that it counts either way
+constexpr double kLeap = 0.9;    // of the radius: a step that comes nearer leaps over the disc
 constexpr int kCoarsePrograms = 30;
 constexpr int kPrograms = 300;
-constexpr double kSettled = 1e-9;   // of the radius, by which the last program moved the cart
-constexpr double kTight = 1e-9;     // of the radius: what counts as on the border
-constexpr double kCopy = 1e-4;      // [rad] between tangents of the outer disc
-constexpr int kNearer = 5;          // programs towards a way within limits of a longer duration
-constexpr int kTightenings = 10;    // such durations
-constexpr double kLongest = 1e6;    // times the duration, where limits are too tight
+constexpr double kSettled = 1e-9;  // of the radius, by which the last program moved the cart
+constexpr double kTight = 1e-9;    // of the radius: what counts as on the border
+constexpr double kCopy = 1e-4;     // [rad] between tangents of the outer disc
+constexpr int kNearer = 5;         // programs towards a way within limits of a longer duration
+constexpr int kTightenings = 10;   // such durations
+constexpr double kLongest = 1e6;   // times the duration, where limits are too tight
 
 double cross(const Vector2d& a, const Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
 double turn_between(const Vector2d& a, const Vector2d& b) { return std::atan2(cross(a, b), a.dot(b)); }
@@ -65,7 +65,8 @@ double energy_of(const PlanarPath& c) { return (c.bottomRows(c.rows() - 1) - c.t
 
 // Tangent, arc, tangent round a disc of radius r from a to b, turning by `turn`, at constant speed.
 PlanarPath shortest(const Vector2d& a, const Vector2d& b, double turn, double r, int samples) {
-  const double la = std::sqrt(std::max(0.0, a.squaredNorm() - r * r)), lb = std::sqrt(std::max(0.0, b.squaredNorm() - r * r));
+  const double la = std::sqrt(std::max(0.0, a.squaredNorm() - r * r)),
+               lb = std::sqrt(std::max(0.0, b.squaredNorm() - r * r));
   const double ua = std::atan2(la, r), ub = std::atan2(lb, r), arc = std::abs(turn) - ua - ub;
   const double sign = turn < 0.0 ? -1.0 : 1.0, from = std::atan2(a.y(), a.x());
   const double begin = from + sign * ua, end = from + turn - sign * ub;  // azimuths where the tangents touch
@@ -91,8 +92,8 @@ PlanarPath shortest(const Vector2d& a, const Vector2d& b, double turn, double r,
   return d;
 }
 
-// The straight motion, d = c − f, and as many variants as it has ways round the disc: where it is within the radius its azimuth
-// goes evenly from that before to that after, on either side.
+// The straight motion, d = c − f, and as many variants as it has ways round the disc: where it is within the radius its
+// azimuth goes evenly from that before to that after, on either side.
 std::vector<PlanarPath> forked(const PlanarPath& straight, double r) {
   struct Dip {
     Eigen::Index before, after;
@@ -145,12 +146,12 @@ class Planner {
 
   bool allowed(const Vector2d& c, const Vector2d& f) const {
     const double slack = kTight * r_, distance = (c - f).norm();
-    return distance >= r_ - slack && distance <= options_.max_radius + slack && (c.array() >= options_.lower.array() - slack).all() &&
-           (c.array() <= options_.upper.array() + slack).all();
+    return distance >= r_ - slack && distance <= options_.max_radius + slack &&
+           (c.array() >= options_.lower.array() - slack).all() && (c.array() <= options_.upper.array() + slack).all();
   }
 
-  // Places that come into question for `wanted`. Where any place is allowed, one of these is: what is allowed has a corner of the
-  // range, a crossing of an edge and a circle, or all of a circle.
+  // Places that come into question for `wanted`. Where any place is allowed, one of these is: what is allowed has a
+  // corner of the range, a crossing of an edge and a circle, or all of a circle.
   std::vector<Vector2d> places(const Vector2d& f, const Vector2d& wanted) const {
     std::vector<Vector2d> out;
     const Vector2d &low = options_.lower, &high = options_.upper;
@@ -227,8 +228,8 @@ class Planner {
     }
   }
 
-  // Dynamic programming over places where each sample could be: the way of the least energy that leaps over no disc, for each
-  // number of turns.
+  // Dynamic programming over places where each sample could be: the way of the least energy that leaps over no disc,
+  // for each number of turns.
   std::vector<PlanarPath> walked(const PlanarPath& f, const std::vector<PlanarPath>& guesses) const {
     const auto m = static_cast<std::size_t>(f.rows());
     std::vector<std::vector<Vector2d>> at(m);
@@ -246,9 +247,8 @@ class Planner {
         if (allowed(place, here)) at[i].push_back(place);
       }
       // Guesses often agree.
-      std::sort(at[i].begin(), at[i].end(), [](const Vector2d& a, const Vector2d& b) {
-        return a.x() != b.x() ? a.x() < b.x() : a.y() < b.y();
-      });
+      std::sort(at[i].begin(), at[i].end(),
+                [](const Vector2d& a, const Vector2d& b) { return a.x() != b.x() ? a.x() < b.x() : a.y() < b.y(); });
       at[i].erase(std::unique(at[i].begin(), at[i].end()), at[i].end());
     }
     // Turns are counted where the azimuth goes over the half-line of π.
@@ -284,7 +284,8 @@ class Planner {
       if (states[m - 1][sheet].energy == kInfinity) continue;
       PlanarPath c(f.rows(), 2);
       std::size_t state = sheet;
-      for (std::size_t i = m; i-- > 0; state = states[i][state].from) c.row(static_cast<Eigen::Index>(i)) = at[i][state / kSheets];
+      for (std::size_t i = m; i-- > 0; state = states[i][state].from)
+        c.row(static_cast<Eigen::Index>(i)) = at[i][state / kSheets];
       out.push_back(std::move(c));
     }
     return out;
@@ -442,21 +443,24 @@ bool keeps(const PlanarPath& c, const Limits& limits, bool at_rest) {
   for (const int axis : {0, 1}) {
     if (step.col(axis).cwiseAbs().maxCoeff() > limits.speed[axis] * (1.0 + 1e-12)) return false;
     if (bend.col(axis).cwiseAbs().maxCoeff() > limits.acceleration[axis]) return false;
-    if (at_rest && std::max(std::abs(step(0, axis)), std::abs(step(m - 2, axis))) > limits.acceleration[axis]) return false;
+    if (at_rest && std::max(std::abs(step(0, axis)), std::abs(step(m - 2, axis))) > limits.acceleration[axis])
+      return false;
   }
   return true;
 }
 
-void check(const PlanarPath& path, const Vector2d& start, const Vector2d& end, double radius, const PlaneCartOptions& o) {
+void check(const PlanarPath& path, const Vector2d& start, const Vector2d& end, double radius,
+           const PlaneCartOptions& o) {
   require(path.rows() >= 3, "the path has ", path.rows(), " samples; it needs at least 3");
   require(path.allFinite(), "the path must be finite");
   require(std::isfinite(radius) && radius > 0.0, "radius = ", radius, " m must be finite and greater than 0");
   require(std::isfinite(o.margin) && o.margin >= 0.0, "margin = ", o.margin, " m must be finite and not negative");
-  require(o.max_radius > radius + o.margin, "max_radius = ", o.max_radius, " m must be greater than radius + margin = ",
-          radius + o.margin, " m");
+  require(o.max_radius > radius + o.margin, "max_radius = ", o.max_radius,
+          " m must be greater than radius + margin = ", radius + o.margin, " m");
   for (const int axis : {0, 1}) {
     const char name = axis == 0 ? 'x' : 'y';
-    require(o.lower[axis] <= o.upper[axis], "the cart's range of ", name, " [", o.lower[axis], ", ", o.upper[axis], "] m is empty");
+    require(o.lower[axis] <= o.upper[axis], "the cart's range of ", name, " [", o.lower[axis], ", ", o.upper[axis],
+            "] m is empty");
     for (const auto& [end_name, value] : {std::pair{"start", start[axis]}, std::pair{"end", end[axis]}}) {
       require(std::isfinite(value), end_name, ": ", name, " = ", value, " must be finite");
       require(value >= o.lower[axis] && value <= o.upper[axis], end_name, ": ", name, " = ", value,
@@ -467,7 +471,8 @@ void check(const PlanarPath& path, const Vector2d& start, const Vector2d& end, d
             " m/s² must be greater than 0");
   }
   require(!o.turn || std::abs(*o.turn) <= 100.0, "turn = ", o.turn.value_or(kNaN), " rad must be within 100");
-  require(std::isfinite(o.duration) && o.duration > 0.0, "duration = ", o.duration, " s must be finite and greater than 0");
+  require(std::isfinite(o.duration) && o.duration > 0.0, "duration = ", o.duration,
+          " s must be finite and greater than 0");
 }
 
 [[noreturn]] void refuse(CartFault fault, double feasible_radius, const std::string& facts) {
@@ -485,8 +490,10 @@ PlaneCartLaw plane_cart_law(const PlanarPath& path, const Vector2d& start, const
     const double distance = ((last ? end : start) - path.row(last ? m - 1 : 0).transpose()).norm();
     const char* which = last ? "end" : "start";
     if (distance <= r) {
-      refuse(last ? CartFault::EndInside : CartFault::StartInside, distance > options.margin ? distance - options.margin : kNaN,
-             message("at the ", which, " the point is ", distance, " m from the first joint's axis, which has to be more than ", r, " m"));
+      refuse(last ? CartFault::EndInside : CartFault::StartInside,
+             distance > options.margin ? distance - options.margin : kNaN,
+             message("at the ", which, " the point is ", distance,
+                     " m from the first joint's axis, which has to be more than ", r, " m"));
     }
     if (distance > options.max_radius) {
       refuse(CartFault::Range, kNaN,
@@ -499,8 +506,8 @@ PlaneCartLaw plane_cart_law(const PlanarPath& path, const Vector2d& start, const
     Vector2d place = path.row(i);
     if (!planner.put(path.row(i), place)) {
       refuse(CartFault::Range, kNaN,
-             message("at sample ", i, " no place in the cart's range keeps the point, at (", path(i, 0), ", ", path(i, 1),
-                     ") m, within its radii"));
+             message("at sample ", i, " no place in the cart's range keeps the point, at (", path(i, 0), ", ",
+                     path(i, 1), ") m, within its radii"));
     }
   }
   PlaneCartLaw law;
@@ -508,8 +515,8 @@ PlaneCartLaw plane_cart_law(const PlanarPath& path, const Vector2d& start, const
     const char* hint = planner.leapt() ? "; some leap over the disc between samples: more samples may help" : "";
     if (options.turn) {
       refuse(CartFault::Winding, kNaN,
-             message("within the cart's range no way was found that turns the point about the first joint's axis by ", *options.turn,
-                     " rad, to within half a turn", hint));
+             message("within the cart's range no way was found that turns the point about the first joint's axis by ",
+                     *options.turn, " rad, to within half a turn", hint));
     }
     refuse(CartFault::Range, kNaN, message("within the cart's range no way round the point was found", hint));
   }
@@ -530,7 +537,8 @@ PlaneCartLaw plane_cart_law(const PlanarPath& path, const Vector2d& start, const
     const bool slow = !keeps(way, {limits(1.0).speed}, false);
     bool done = within(1.0, way, kPrograms);
     if (!done) {
-      // The half-planes of a way that takes its limits into account leave more room: down to them from a longer duration.
+      // The half-planes of a way that takes its limits into account leave more room: down to them from a longer
+      // duration.
       double good = 2.0, bad = 1.0;
       while (good < kLongest && !within(good, way, kNearer)) {
         bad = good;

@@ -31,8 +31,8 @@ Hinge hinge(double distance, double clearance) noexcept {
   return {missing - 0.5 * clearance, -1.0, 1.0 / missing};
 }
 
-// A slope in the place of each sphere, gathered into one in q. Σ_i f_iᵀ ∂c_i/∂q_k = z_kᵀ Σ_i (c_i − p_k) × f_i, over the
-// spheres i that joint k moves, is z_kᵀ(M − p_k × F) with running sums F = Σ f_i and M = Σ c_i × f_i from the tip.
+// A slope in the place of each sphere, gathered into one in q. Σ_i f_iᵀ ∂c_i/∂q_k = z_kᵀ Σ_i (c_i − p_k) × f_i, over
+// the spheres i that joint k moves, is z_kᵀ(M − p_k × F) with running sums F = Σ f_i and M = Σ c_i × f_i from the tip.
 class Gathered {
  public:
   explicit Gathered(const ArmSpheres& spheres) noexcept : spheres_(spheres) {
@@ -53,8 +53,9 @@ class Gathered {
       const std::size_t at = static_cast<std::size_t>(k);
       force += force_[at];
       moment += moment_[at];
-      gradient[k] = spheres_.chain().constants()[at].prismatic ? state.axis[at].dot(force)
-                                                               : state.axis[at].dot(moment - state.origin[at].cross(force));
+      gradient[k] = spheres_.chain().constants()[at].prismatic
+                        ? state.axis[at].dot(force)
+                        : state.axis[at].dot(moment - state.origin[at].cross(force));
     }
   }
 
@@ -239,7 +240,8 @@ class JointLimitCost final : public JointCost {
   }
   double model(const JointRef& q, JointVector& slope, JointMatrix& hessian) const noexcept override {
     hessian.setZero(dof(), dof());
-    for (int j = 0; j < dof(); ++j) hessian(j, j) = weight_ * ((q[j] < lower_[j] ? 1.0 : 0.0) + (q[j] > upper_[j] ? 1.0 : 0.0));
+    for (int j = 0; j < dof(); ++j)
+      hessian(j, j) = weight_ * ((q[j] < lower_[j] ? 1.0 : 0.0) + (q[j] > upper_[j] ? 1.0 : 0.0));
     return gradient(q, slope);
   }
 

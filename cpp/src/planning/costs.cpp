@@ -19,10 +19,12 @@ void require_positive(const char* name, double value) {
 
 class PotentialCost final : public JointCost {
  public:
-  PotentialCost(const SingularSets& sets, const Potential& potential, double weight) : sets_(sets), potential_(potential) {
+  PotentialCost(const SingularSets& sets, const Potential& potential, double weight)
+      : sets_(sets), potential_(potential) {
     require_positive("weight", weight);
     require_positive("eta2", potential.eta2);
-    require(std::isfinite(potential.eta1) && potential.eta1 <= 100.0, "eta1 = ", potential.eta1, " must be at most 100");
+    require(std::isfinite(potential.eta1) && potential.eta1 <= 100.0, "eta1 = ", potential.eta1,
+            " must be at most 100");
     for (double& w : potential_.weights) {
       require(std::isfinite(w) && w >= 0.0, "a set's weight is ", w, "; it must be finite and not negative");
       w *= weight;
@@ -133,7 +135,8 @@ class GenericCost final : public InverseCost {
 // weight · f(index), by value and slope of f.
 class IndexCost : public JointCost {
  public:
-  IndexCost(const Chain& chain, const IndexFunction& index, double weight) : chain_(chain), index_(index), weight_(weight) {
+  IndexCost(const Chain& chain, const IndexFunction& index, double weight)
+      : chain_(chain), index_(index), weight_(weight) {
     require_positive("weight", weight);
   }
   int dof() const noexcept override { return chain_.dof(); }

@@ -29,8 +29,8 @@ DistanceField::DistanceField(const std::vector<double>& distances, const Shape& 
     count *= static_cast<std::size_t>(length);
     last_[axis] = length - 1.0;
   }
-  require(distances.size() == count, "there are ", distances.size(), " distances for a grid of ", shape[0], "×", shape[1],
-          "×", shape[2], " = ", count, " nodes");
+  require(distances.size() == count, "there are ", distances.size(), " distances for a grid of ", shape[0], "×",
+          shape[1], "×", shape[2], " = ", count, " nodes");
   const auto bad = std::find_if(distances.begin(), distances.end(), [](double d) { return !(std::abs(d) < 1e30); });
   require(bad == distances.end(), "distance ", bad - distances.begin(), " is not finite");
   nodes_ = std::make_shared<const std::vector<float>>(distances.begin(), distances.end());

@@ -18,25 +18,26 @@
 namespace sigmaik::planning::detail {
 
 // Constraints come in eight families, one number a joint and node each:
-// q − lower, upper − q, hV + p, hV − p, h²A + a, h²A − a ≥ 0; and, where the positions between the nodes are to keep their
-// limits too, q + p/2 − lower, upper − q − p/2 ≥ 0: a step's parabola stays in the hull of its ends and that point.
+// q − lower, upper − q, hV + p, hV − p, h²A + a, h²A − a ≥ 0; and, where the positions between the nodes are to keep
+// their limits too, q + p/2 − lower, upper − q − p/2 ≥ 0: a step's parabola stays in the hull of its ends and that
+// point.
 enum Family { kLower, kUpper, kBackward, kForward, kBrake, kPush, kLowerBetween, kUpperBetween, kFamilies };
 
 // What a node holds besides its stage's model.
 template <int W>
 struct Node {
-  Row<W> q, p, a;             // the iterate
-  Row<W> slack[kFamilies];    // > 0
-  Row<W> miss[kFamilies];     // constraint − slack: not 0 only where the guess broke the constraint
-  Row<W> dual[kFamilies];     // > 0
-  Row<W> weight[kFamilies];   // dual/slack
-  Row<W> force[kFamilies];    // what the barrier pushes with
+  Row<W> q, p, a;            // the iterate
+  Row<W> slack[kFamilies];   // > 0
+  Row<W> miss[kFamilies];    // constraint − slack: not 0 only where the guess broke the constraint
+  Row<W> dual[kFamilies];    // > 0
+  Row<W> weight[kFamilies];  // dual/slack
+  Row<W> force[kFamilies];   // what the barrier pushes with
   Row<W> dslack[kFamilies], ddual[kFamilies];
   Row<W> dq, dp, da;
   double cost = 0.0;
-  Row<W> gradient;            // of the cost
-  Square<W> hessian;          // of the cost
-  Square<W> convex;           // its positive part
+  Row<W> gradient;    // of the cost
+  Square<W> hessian;  // of the cost
+  Square<W> convex;   // its positive part
   bool is_convex = true;
 };
 
@@ -56,13 +57,13 @@ class InteriorPoint final : public TimeOptimal::Engine {
   TimeOptimalResult solve(const TimeOptimalProblem& problem) override;
 
  private:
-  static constexpr double kLeastStep = 1e-9;       // [s]
-  static constexpr double kLeastTime = 1e-3;       // [s] times shorter than this need not be more accurate
-  static constexpr double kLeastSlack = 1e-4;      // of a constraint that the first guess breaks, as a part of its limit
-  static constexpr double kToBoundary = 0.995;     // the part of a slack or multiplier that a step may use up
-  static constexpr double kBentCurvature = 0.1;    // least curvature in the step, as a part of the effort's
-  static constexpr double kRounding = 100.0;       // how far above the tolerance rounding may end the search
-  static constexpr double kKick = 0.02;            // [rad or m]
+  static constexpr double kLeastStep = 1e-9;     // [s]
+  static constexpr double kLeastTime = 1e-3;     // [s] times shorter than this need not be more accurate
+  static constexpr double kLeastSlack = 1e-4;    // of a constraint that the first guess breaks, as a part of its limit
+  static constexpr double kToBoundary = 0.995;   // the part of a slack or multiplier that a step may use up
+  static constexpr double kBentCurvature = 0.1;  // least curvature in the step, as a part of the effort's
+  static constexpr double kRounding = 100.0;     // how far above the tolerance rounding may end the search
+  static constexpr double kKick = 0.02;          // [rad or m]
   static constexpr int kKicks = 3;
 
   // 1 for each joint with a constraint of that family at node k, else 0. Ends cannot move, and the last acceleration is
@@ -106,14 +107,14 @@ class InteriorPoint final : public TimeOptimal::Engine {
   Row<W> lower_{}, upper_{}, velocity_{}, acceleration_{};
   Row<W> active_[kFamilies]{};  // 1 where there is a limit, else 0
   Row<W> none_{}, leaves_[2]{}, arrives_[2]{};
-  Row<W> start_{}, end_{};      // velocities at the ends
+  Row<W> start_{}, end_{};  // velocities at the ends
   std::vector<Stage<W>> stages_;
   std::vector<Node<W>> nodes_;
-  double end_cost_ = 0.0;       // of the two nodes that cannot move
+  double end_cost_ = 0.0;  // of the two nodes that cannot move
   double h_ = 1.0, dh_ = 0.0, h_dual_ = 0.0;
-  double constraints_ = 1.0;    // how many
+  double constraints_ = 1.0;  // how many
   bool feasible_ = true;
-  bool bent_ = false;           // the model had no minimum in the step: one was made up
+  bool bent_ = false;  // the model had no minimum in the step: one was made up
   mutable JointVector joints_, joint_gradient_;
   JointMatrix joint_hessian_;
 };
@@ -216,7 +217,7 @@ void InteriorPoint<W>::guess(const TimeOptimalProblem& problem) {
     const double p0 = h * start_[i], p1 = h * end_[i];
     // Σ a = p1 − p0;  Σ (m − k − ½) a = q1 − q0 − m p0.
     const double s0 = m, s1 = 0.5 * m * (m - 1.0);
-    const double t0 = 0.5 * m * m;                                         // Σ (m − k − ½)
+    const double t0 = 0.5 * m * m;                                             // Σ (m − k − ½)
     const double t1 = (m - 0.5) * s1 - (m - 1.0) * m * (2.0 * m - 1.0) / 6.0;  // Σ (m − k − ½) k
     const double r0 = p1 - p0, r1 = q1 - q0 - m * p0, det = s0 * t1 - s1 * t0;
     const double c0 = (r0 * t1 - s1 * r1) / det, c1 = (s0 * r1 - t0 * r0) / det;
@@ -298,8 +299,8 @@ void InteriorPoint<W>::convexify() noexcept {
   }
 }
 
-// The model of the Lagrangian's barrier problem at the iterate. For each constraint c with slack s, multiplier z and miss
-// r = c − s it has z/s ∇c∇cᵀ and −(μ/s − z/s r) ∇c.
+// The model of the Lagrangian's barrier problem at the iterate. For each constraint c with slack s, multiplier z and
+// miss r = c − s it has z/s ∇c∇cᵀ and −(μ/s − z/s r) ∇c.
 template <int W>
 void InteriorPoint<W>::assemble(double mu, bool convex) noexcept {
   const double effort = 2.0 * options_.effort_weight / (h_ * h_ * h_ * h_);
@@ -377,7 +378,8 @@ bool InteriorPoint<W>::find_direction(double mu, bool convex) noexcept {
     }
     const double bow = -4.0 * effort / h_;
     for (int i = 0; i < W; ++i) {
-      sum_along[i] += x.gradient[i] * s.dq[1][i] + effort * (x.a[i] + s.da[0][i]) * s.da[1][i] + bow * x.a[i] * s.da[0][i];
+      sum_along[i] += x.gradient[i] * s.dq[1][i] + effort * (x.a[i] + s.da[0][i]) * s.da[1][i] +
+                      bow * x.a[i] * s.da[0][i];
       sum_curvature[i] += effort * s.da[1][i] * s.da[1][i] + 2.0 * bow * x.a[i] * s.da[1][i] -
                           2.0 * acceleration_[i] * (x.dual[kBrake][i] + x.dual[kPush][i]);
     }

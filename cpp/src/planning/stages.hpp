@@ -42,13 +42,13 @@ struct alignas(64) Square {
 // The quadratic model of a stage in (δq, δp, δa, δh), and what the recursion leaves to solve with it.
 template <int W>
 struct Stage {
-  Square<W> qq;             // Hessian in q: dense, as costs couple the joints
-  Row<W> pp, qp, aa;        // diagonals: limits and effort see one joint each
-  Row<W> ph, ah;            // with the step
-  Row<W> gq, gp, ga;        // gradient
-  Square<W> factor;         // Lᵀ (row j is column j of L) of R + BᵀPB = L Lᵀ; its diagonal inverted
-  Square<W> wq, wp;         // L⁻¹ BᵀPA
-  Row<W> w[2];              // L⁻¹ (g_a + Bᵀs), for the gradient and for the step's column
+  Square<W> qq;                // Hessian in q: dense, as costs couple the joints
+  Row<W> pp, qp, aa;           // diagonals: limits and effort see one joint each
+  Row<W> ph, ah;               // with the step
+  Row<W> gq, gp, ga;           // gradient
+  Square<W> factor;            // Lᵀ (row j is column j of L) of R + BᵀPB = L Lᵀ; its diagonal inverted
+  Square<W> wq, wp;            // L⁻¹ BᵀPA
+  Row<W> w[2];                 // L⁻¹ (g_a + Bᵀs), for the gradient and for the step's column
   Row<W> dq[2], dp[2], da[2];  // the two solutions
 };
 
@@ -178,8 +178,8 @@ struct Recursion {
     return true;
   }
 
-  // Solutions of the factorised model: [0] for its gradient with the step held, [1] for a unit change of the step, which
-  // moves the ends: δp_0 = start, δp_{N-1} = end.
+  // Solutions of the factorised model: [0] for its gradient with the step held, [1] for a unit change of the step,
+  // which moves the ends: δp_0 = start, δp_{N-1} = end.
   static SIGMAIK_INLINE void solve(Stages& stages, int nodes, const Row<W>& start, const Row<W>& end) noexcept {
     Stage<W>& s1 = stages[static_cast<std::size_t>(nodes - 3)];
     Stage<W>& s2 = stages[static_cast<std::size_t>(nodes - 2)];

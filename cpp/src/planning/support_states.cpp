@@ -96,8 +96,8 @@ struct SupportPlanner::Work {
       require(q->size() == n, name, " has ", q->size(), " entries, the chain has ", n, " joints");
       for (int i = 0; i < n; ++i) {
         require((*q)[i] >= lower[i] && (*q)[i] <= upper[i], name, " of joint '",
-                chain.joint_names()[static_cast<std::size_t>(i)], "' is ", (*q)[i], ", outside [", lower[i], ", ", upper[i],
-                "] rad or m");
+                chain.joint_names()[static_cast<std::size_t>(i)], "' is ", (*q)[i], ", outside [", lower[i], ", ",
+                upper[i], "] rad or m");
       }
     }
     line.resize(m, n);
@@ -159,8 +159,8 @@ SupportPlanner& SupportPlanner::operator=(SupportPlanner&&) noexcept = default;
 int SupportPlanner::states() const noexcept { return work_->states; }
 const Chain& SupportPlanner::chain() const noexcept { return work_->chain; }
 
-SupportStates SupportPlanner::gradient(const JointVector& start, const JointVector& goal, const GradientOptions& options,
-                                       const std::vector<double>& guess) {
+SupportStates SupportPlanner::gradient(const JointVector& start, const JointVector& goal,
+                                       const GradientOptions& options, const std::vector<double>& guess) {
   Work& w = *work_;
   require_number("prior_weight", options.prior_weight, 0.0, true);
   require_number("tolerance", options.tolerance, 0.0, false);
@@ -357,8 +357,8 @@ std::vector<double> spline_velocities(const std::vector<double>& q, int states, 
       v[static_cast<std::size_t>(i * dof + j)] = (right - carried) / pivot;
     }
     for (int i = states - 2; i >= 0; --i) {
-      v[static_cast<std::size_t>(i * dof + j)] -=
-          upper[static_cast<std::size_t>(i)] * v[static_cast<std::size_t>((i + 1) * dof + j)];
+      v[static_cast<std::size_t>(i * dof + j)] -= upper[static_cast<std::size_t>(i)] *
+                                                  v[static_cast<std::size_t>((i + 1) * dof + j)];
     }
   }
   return v;

@@ -56,9 +56,9 @@ namespace {
 
 using sigmaik::detail::require;
 
-constexpr double kWorthALook = 1e-3;  // a node's cost, as a part of what time costs, that warrants other starts
+constexpr double kWorthALook = 1e-3;    // a node's cost, as a part of what time costs, that warrants other starts
 constexpr double kStandingStep = 1e-6;  // [s] of a motion that goes nowhere
-constexpr double kBend = 0.6;         // [rad or m] by which these are bent
+constexpr double kBend = 0.6;           // [rad or m] by which these are bent
 
 std::unique_ptr<TimeOptimal::Engine> make_engine(const Chain& chain, const JointCostPtr& cost,
                                                  const TimeOptimalOptions& options) {
@@ -88,8 +88,8 @@ TimeOptimal::TimeOptimal(Chain chain, JointCostPtr cost, const TimeOptimalOption
   require(options.tolerance >= 1e-12 && options.tolerance <= 1e-2, "tolerance = ", options.tolerance,
           " must be in [1e-12, 1e-2]");
   require(options.max_iterations >= 1, "max_iterations = ", options.max_iterations, " must be at least 1");
-  require(!cost_ || cost_->dof() == chain_.dof(), "the cost is for ", cost_ ? cost_->dof() : 0, " joints, the chain has ",
-          chain_.dof());
+  require(!cost_ || cost_->dof() == chain_.dof(), "the cost is for ", cost_ ? cost_->dof() : 0,
+          " joints, the chain has ", chain_.dof());
   for (int i = 0; i < chain_.dof(); ++i) {
     require(options.effort_weight > 0.0 || std::isfinite(chain_.limits().acceleration[i]), "joint '",
             chain_.joint_names()[static_cast<std::size_t>(i)],

@@ -1,4 +1,5 @@
-"""From under a table to above it, with and without the geometry-aware index (Petrović et al., section 4.2 and figure 2)."""
+"""From under a table to above it, with and without the geometry-aware index (Petrović et al., section 4.2 and figure
+2)."""
 
 from __future__ import annotations
 

@@ -216,9 +216,7 @@ def motion(
     return Motion(example, chain, q, pose, down, distance, duration, offset, True)
 
 
-def run(
-    motion: Motion, variant: str, settings: Settings, progress: Callable[[int], None] | None = None
-) -> Track:
+def run(motion: Motion, variant: str, settings: Settings, progress: Callable[[int], None] | None = None) -> Track:
     """Follows the target by one of VARIANTS.
 
     progress: called with the number of samples done since the last call

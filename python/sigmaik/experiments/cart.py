@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 import sigmaik as sk
 from sigmaik import _core
 from sigmaik.planning.cart import PUBLISHED_ITERATIONS, CartMotion, cart_motion, evaluate_cart_motion
-from sigmaik.planning.cart_plane import PlaneCartMotion, cart_motion_plane
 from sigmaik.planning.cart_path import PosePath, pose_paths
+from sigmaik.planning.cart_plane import PlaneCartMotion, cart_motion_plane
 from sigmaik.planning.cart_trajectory import follow
 
 __all__ = ["METHODS", "VARIANTS", "CartExperiment", "CartRun", "cart_xy", "density", "descent", "experiment", "run"]
@@ -42,8 +42,8 @@ METHODS = {
 _JOINTS = (-1.235, -1.7272, 0.7, -1.0, 1.5951, -0.0311)
 _LAST_AXIS_1 = 1.235
 _CART = (0.5, 0.75)
-# x, y, z [m], then the turns about z, y, x [rad], of each in the axes that the one before has turned. The paper's second
-# pose lacks a comma: "1.4551 − 0.1648" is z and the turn about z.
+# x, y, z [m], then the turns about z, y, x [rad], of each in the axes that the one before has turned. The paper's
+# second pose lacks a comma: "1.4551 − 0.1648" is z and the turn about z.
 _POSES = (
     (0.2607, 0.1354, 1.4551, -2.6348, 0.7090, -0.1134),
     (0.8531, -0.2549, 1.4551, -0.1648, 0.7090, -0.1134),
@@ -237,9 +237,7 @@ def _judge(e: CartExperiment, method: str, motion: CartMotion | PlaneCartMotion,
     least = np.linalg.svd(e.chain.jacobian(q[:, 1:]), compute_uv=False)[:, -1]
     speed = np.abs(np.diff(q[:, 1:], axis=0)) * ((e.samples - 1) / e.duration)
     missed = q[-1] - e.taught[1] if len(q) == e.samples else np.full(7, math.nan)
-    return CartRun(
-        method, motion, q, missed, task, float(np.min(least)), float(np.max(speed, initial=0.0))
-    )
+    return CartRun(method, motion, q, missed, task, float(np.min(least)), float(np.max(speed, initial=0.0)))
 
 
 def _shift(x: float, y: float = 0.0) -> Array:

@@ -62,7 +62,17 @@ def save_cart_table(e: CartExperiment, runs: Sequence[CartRun], file: pathlib.Pa
         for run in runs:
             m = run.motion
             writer.writerow(
-                [e.variant, run.method, e.samples, m.iterations if isinstance(m, CartMotion) else m.programs, m.inside, m.time_inside, m.clearance, m.energy, run.followed]
+                [
+                    e.variant,
+                    run.method,
+                    e.samples,
+                    m.iterations if isinstance(m, CartMotion) else m.programs,
+                    m.inside,
+                    m.time_inside,
+                    m.clearance,
+                    m.energy,
+                    run.followed,
+                ]
                 + [run.task_error, run.min_singular_value, run.max_joint_speed, *run.joint_error]
             )
     return file

@@ -1,4 +1,5 @@
-"""A time-optimal motion in physics: computed torque, with the true model and with a payload unknown to it; velocity loops."""
+"""A time-optimal motion in physics: computed torque, with the true model and with a payload unknown to it; velocity
+loops."""
 
 from __future__ import annotations
 
@@ -38,7 +39,9 @@ def variants(settings: PhysicsSettings) -> tuple[str, ...]:
     return (*(("payload unknown", "payload known") if settings.payload else ("computed torque",)), "velocity loops")
 
 
-def drive(robot: str, chain: sk.Chain, plan: sk.planning.Trajectory, variant: str, settings: PhysicsSettings) -> ExecuteRun:
+def drive(
+    robot: str, chain: sk.Chain, plan: sk.planning.Trajectory, variant: str, settings: PhysicsSettings
+) -> ExecuteRun:
     """Executes the plan. ValueError where the plan failed, or a setting is out of its range."""
     by_torque = variant != "velocity loops"
     arm: Simulation = simulation(chain, settings, "torque" if by_torque else "velocity")
@@ -53,7 +56,16 @@ def drive(robot: str, chain: sk.Chain, plan: sk.planning.Trajectory, variant: st
 
 def save_executions(runs: Sequence[ExecuteRun], file: str | pathlib.Path) -> pathlib.Path:
     """The table as CSV, SI units. Returns the file's path."""
-    columns = ("variant", "max_error", "rms_error", "final_error", "max_tip_error", "final_tip_error", "max_effort", "saturated")
+    columns = (
+        "variant",
+        "max_error",
+        "rms_error",
+        "final_error",
+        "max_tip_error",
+        "final_tip_error",
+        "max_effort",
+        "saturated",
+    )
     rows = [
         (
             run.variant,

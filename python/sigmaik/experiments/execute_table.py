@@ -13,7 +13,8 @@ __all__ = ["execute_table"]
 
 
 def execute_table(runs: Sequence[ExecuteRun], title: str) -> Table:
-    """A line per way to drive the arm: largest errors of joints and tip, on the way and at the end, and the torques used."""
+    """A line per way to drive the arm: largest errors of joints and tip, on the way and at the end, and the torques
+    used."""
     table = titled_table(title)
     table.add_column("", no_wrap=True)
     for head in ("error\nmrad", "\nrms", "at the\nend", "tip off\nmm", "at the\nend", "effort\n%", "cut\n% of t"):

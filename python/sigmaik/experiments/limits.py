@@ -301,10 +301,7 @@ def _beyond_limits(chain: sk.Chain, home: Array, settings: LimitsSettings) -> It
             beyond[joint] = limit + sign * BEYOND_LIMIT
             counts = [_count(settings, settings.pace * s) for s in (3.0, 3.0)]
             poses = np.concatenate(
-                [
-                    np.broadcast_to(chain.pose(q), (c, 4, 4))
-                    for q, c in zip((beyond, start), counts, strict=True)
-                ]
+                [np.broadcast_to(chain.pose(q), (c, 4, 4)) for q, c in zip((beyond, start), counts, strict=True)]
             )
             side = "lower" if sign < 0.0 else "upper"
             yield Trial(f"{name} {side}", start, poses, _phases(("hold", "return"), counts))
@@ -363,9 +360,7 @@ def drive(
 _Loop = tuple[Array, Array, Array, NDArray[np.bool_]]
 
 
-def _served(
-    experiment: LimitsExperiment, trial: Trial, variant: str, progress: Callable[[int], None] | None
-) -> _Loop:
+def _served(experiment: LimitsExperiment, trial: Trial, variant: str, progress: Callable[[int], None] | None) -> _Loop:
     s = experiment.settings
     on = variant != "none"
     servo = sk.Servo(
@@ -398,9 +393,7 @@ def _served(
     return q, qdot, error, held
 
 
-def _clamped(
-    experiment: LimitsExperiment, trial: Trial, _: str, progress: Callable[[int], None] | None
-) -> _Loop:
+def _clamped(experiment: LimitsExperiment, trial: Trial, _: str, progress: Callable[[int], None] | None) -> _Loop:
     """The rule's velocities, each joint clamped to its speed, and to what is left to its position limit."""
     chain, dt = experiment.chain, 1.0 / experiment.settings.rate
     limits = chain.limits
@@ -492,9 +485,7 @@ def summarize_limits(traces: Sequence[Trace]) -> LimitsSummary:
     qddot = np.concatenate([t.acceleration for t in traces])
 
     holds = [t.trial.phase("hold") for t in traces]
-    tails = [
-        t.qdot[h][-max(1, (h.stop - h.start) // 4) :] for t, h in zip(traces, holds, strict=True) if h.stop
-    ]
+    tails = [t.qdot[h][-max(1, (h.stop - h.start) // 4) :] for t, h in zip(traces, holds, strict=True) if h.stop]
     rest = np.concatenate(tails) if tails else np.full((1, 1), math.nan)
     held_at = [t.error[h.stop - 1] for t, h in zip(traces, holds, strict=True) if h.stop]
     returns = [(t, t.trial.phase("return")) for t in traces]

@@ -194,6 +194,4 @@ def _value(name: str, key: str, text: str, default: Value) -> Value:
 
 
 def _show(value: Value) -> str:
-    return (
-        str(value).lower() if isinstance(value, bool) else f"{value:g}" if isinstance(value, float) else value
-    )
+    return str(value).lower() if isinstance(value, bool) else f"{value:g}" if isinstance(value, float) else value

@@ -1,12 +1,13 @@
-"""The Monte Carlo study of Beck et al. (2022), section 4: what keeping clear of singularities costs, and what it brings.
+"""The Monte Carlo study of Beck et al. (2022), section 4: what keeping clear of singularities costs, and what it
+brings.
 
-Random pairs of configurations, the same for every objective; for each the metrics (28) to (32) of the motion between them.
-A sample depends on the seed and its number alone, so that any sample can be computed anywhere, in any order: the study runs
-on whatever has the interface of `concurrent.futures.Executor`, writes each sample as it comes, and resumes where it was
-interrupted.
+Random pairs of configurations, the same for every objective; for each the metrics (28) to (32) of the motion between
+them. A sample depends on the seed and its number alone, so that any sample can be computed anywhere, in any order: the
+study runs on whatever has the interface of `concurrent.futures.Executor`, writes each sample as it comes, and resumes
+where it was interrupted.
 
-Two things that the paper does not do: m is also measured densely, between the nodes, where it can be orders of magnitude
-smaller; and it is counted which crossings of singular sets no path could have avoided.
+Two things that the paper does not do: m is also measured densely, between the nodes, where it can be orders of
+magnitude smaller; and it is counted which crossings of singular sets no path could have avoided.
 """
 
 from __future__ import annotations
@@ -232,9 +233,9 @@ def run_study(
 ) -> list[Row]:
     """Computes what is missing in `file`, and returns all rows, in the order of samples.
 
-    The file is CSV, a line for each sample and objective, after a line "# " with the study as JSON. All lines of a sample
-    are written at once; what an interruption has left of a sample is computed again. Raises ValueError where the file is of
-    another study.
+    The file is CSV, a line for each sample and objective, after a line "# " with the study as JSON. All lines of a
+    sample are written at once; what an interruption has left of a sample is computed again. Raises ValueError where the
+    file is of another study.
 
     executor: takes the work; by default it is done here. `jobs`: how many pieces of work are kept waiting.
     advance: called with the number of samples done, first with those that were in the file.

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 __all__ = ["PAPER"]
 
-# By arm, objective and field of `montecarlo.Summary`: t_F [s], computing time [ms], m_min, m_max, m_avg, l_p [m], l_quat, with mean and deviation.
+# By arm, objective and field of `montecarlo.Summary`: t_F [s], computing time [ms], m_min, m_max, m_avg, l_p [m],
+# l_quat, with mean and deviation.
 PAPER: dict[str, dict[str, dict[str, tuple[float, ...]]]] = {
     "comau_racer_7_1_4": {
         "none": {

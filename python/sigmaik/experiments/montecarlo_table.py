@@ -15,7 +15,8 @@ __all__ = ["study_table"]
 
 
 def study_table(study: Study, summaries: Sequence[Summary]) -> Table:
-    """A line a metric, a column an objective; below it, dim, tables 3 to 5 of Beck et al. (2022) where they have the arm."""
+    """A line a metric, a column an objective; below it, dim, tables 3 to 5 of Beck et al. (2022) where they have the
+    arm."""
     paper = PAPER.get(study.robot)
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0))
     table.add_column("", no_wrap=True)

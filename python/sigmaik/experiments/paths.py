@@ -103,9 +103,7 @@ def make_pose(position: Sequence[float] | Array, rotation: Array) -> Array:
     return pose
 
 
-def _waypoints(
-    name: str, positions: Sequence[tuple[float, float, float]], rotation: Array, description: str
-) -> Path:
+def _waypoints(name: str, positions: Sequence[tuple[float, float, float]], rotation: Array, description: str) -> Path:
     segments = tuple(
         Segment.hold(f"({x:g},{y:g},{z:g})", make_pose((x, y, z), rotation), DWELL) for x, y, z in positions
     )
@@ -412,9 +410,7 @@ def _json_rows(file: pathlib.Path, text: str) -> list[tuple[str, Mapping[str, ob
         where = f"waypoint {i + 1}"
         if isinstance(item, list):
             if len(item) != len(COLUMNS):
-                raise ValueError(
-                    f"waypoints '{file}', {where}: {len(item)} numbers; expected {', '.join(COLUMNS)}"
-                )
+                raise ValueError(f"waypoints '{file}', {where}: {len(item)} numbers; expected {', '.join(COLUMNS)}")
             item = dict(zip(COLUMNS, item, strict=True))
         if not isinstance(item, dict):
             raise ValueError(f"waypoints '{file}', {where}: neither an object nor a list of seven numbers")

@@ -1,11 +1,13 @@
 """The reaching experiments with an arm that has mass: drives, effort limits, friction, noise and delay.
 
-The arm's joints are driven every millisecond, the method runs at the experiment's rate, and between two of its cycles its
-joint velocities are held. What closes the loop is either of
+The arm's joints are driven every millisecond, the method runs at the experiment's rate, and between two of its cycles
+its joint velocities are held. What closes the loop is either of
 
-- "reference": the servo follows its own command, as it does without physics, and the drives follow the servo, in position
+- "reference": the servo follows its own command, as it does without physics, and the drives follow the servo, in
+position
   and velocity. No measurement reaches the method. The command is that of the kinematic run, to the last digit.
-- "measured": pose error, Jacobian and posture are those of the measured joints, as in the paper's own loop, and the drives
+- "measured": pose error, Jacobian and posture are those of the measured joints, as in the paper's own loop, and the
+drives
   get the joint velocities alone.
 """
 
@@ -59,7 +61,9 @@ class PhysicsSettings:
     position_noise: float = 0.0  #: standard deviation [rad or m]
     velocity_noise: float = 0.0  #: [rad/s or m/s]
     delay: int = 0  #: of measurements, in periods
-    trip: float = 5.0  #: where a joint is faster than so many times its limit the drives trip: the arm stands from then on
+    trip: float = (
+        5.0  #: where a joint is faster than so many times its limit the drives trip: the arm stands from then on
+    )
     seed: int = 0
 
 
@@ -181,7 +185,9 @@ class _Measured:
         s, q = self._settings, measured.q
         error = sk.pose_error(self._chain.pose(q), target)
         parts = ((error[:3], s.max_position_error, s.gain_linear), (error[3:], s.max_orientation_error, s.gain_angular))
-        twist = np.concatenate([gain * e * min(1.0, cap / max(float(np.linalg.norm(e)), 1e-300)) for e, cap, gain in parts])
+        twist = np.concatenate(
+            [gain * e * min(1.0, cap / max(float(np.linalg.norm(e)), 1e-300)) for e, cap, gain in parts]
+        )
         posture = None
         if s.posture_gain:
             posture = np.clip(s.posture_gain * (self._posture - q), -s.posture_max_speed, s.posture_max_speed)

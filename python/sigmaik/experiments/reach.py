@@ -208,9 +208,7 @@ def run(
         singular_values[k], status[k] = step.singular_values, int(step.status)
         if progress is not None and (k + 1) % stride == 0:
             progress(stride)
-    return Run(
-        experiment, method, velocity_limits, t, index, q, qdot, target, error, singular_values, status, scale
-    )
+    return Run(experiment, method, velocity_limits, t, index, q, qdot, target, error, singular_values, status, scale)
 
 
 def _middle(chain: sk.Chain) -> Array:

@@ -1,8 +1,9 @@
 """Reaching tasks: motions between random configurations along which an index is good (Petrović et al., table 1).
 
-Every task is solved by every method. Along the motion, at 201 points, λ₁ (the smallest eigenvalue of JJᵀ), m = √det(JJᵀ) and
-κ = log₁₀(λ₆/λ₁) are averaged: the definitions that fit the paper's figures, where its text has others. Indices are bought with
-length, so that the path's length and the largest acceleration, both in unit time, stand beside them.
+Every task is solved by every method. Along the motion, at 201 points, λ₁ (the smallest eigenvalue of JJᵀ), m =
+√det(JJᵀ) and κ = log₁₀(λ₆/λ₁) are averaged: the definitions that fit the paper's figures, where its text has others.
+Indices are bought with length, so that the path's length and the largest acceleration, both in unit time, stand beside
+them.
 """
 
 from __future__ import annotations
@@ -97,7 +98,12 @@ def task(robot: str, seed: int, number: int) -> tuple[sk.Chain, Array, Array]:
 
 
 def solve_task(
-    chain: sk.Chain, start: Array, goal: Array, method: str, seed: int = 0, planning: Planning = Planning()  # noqa: B008
+    chain: sk.Chain,
+    start: Array,
+    goal: Array,
+    method: str,
+    seed: int = 0,
+    planning: Planning = Planning(),  # noqa: B008
 ) -> Run:
     """Plans, and measures."""
     begin = time.perf_counter()
@@ -159,7 +165,9 @@ def _task_priority(chain: sk.Chain, start: Array, goal: Array) -> Array:
         twist = sk.pose_error(chain.pose(q), target)  # over one step
         posture = (goal - q) / (steps - i)
         step = solver.solve(chain.jacobian(q), twist, posture=posture).qdot
-        q = np.clip(q + step * min(1.0, 0.2 / max(float(np.abs(step).max()), 1e-300)), chain.limits.lower, chain.limits.upper)
+        q = np.clip(
+            q + step * min(1.0, 0.2 / max(float(np.abs(step).max()), 1e-300)), chain.limits.lower, chain.limits.upper
+        )
         path.append(q)
     return np.array(path)
 

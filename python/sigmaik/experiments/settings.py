@@ -61,9 +61,7 @@ _PUBLISHED = {
     ),
     # Rate, gains and cap *ours*: neither the paper nor the code has them. The arm is not redundant: no
     # posture.
-    "puma560": Settings(
-        rate=50.0, gain_linear=5.0, gain_angular=5.0, max_position_error=0.5, singular_gain=1.0
-    ),
+    "puma560": Settings(rate=50.0, gain_linear=5.0, gain_angular=5.0, max_position_error=0.5, singular_gain=1.0),
 }
 
 

@@ -132,9 +132,7 @@ def broken_table(rows: Sequence[LimitsSummary]) -> Table:
         ]
         pairs += [(row.jerk_broken, row.jerk_worst)] if jerk else []
         cells = [
-            Text(cell, style="red" if count else "")
-            for count, worst in pairs
-            for cell in (str(count), compact(worst))
+            Text(cell, style="red" if count else "") for count, worst in pairs for cell in (str(count), compact(worst))
         ]
         _add(table, rows, i, [*cells, compact(row.acceleration_peak), compact(row.acceleration_rms)])
     return table

@@ -1,8 +1,8 @@
 """A target that moves: scripted, recorded, or a hand-held marker before a camera, and an arm that follows.
 
 What the camera sees becomes samples, late, noisy, some missing and some wrong; a `sigmaik.TargetStream` makes targets
-of them, and a `sigmaik.Servo` at 1 kHz, with all limits on, follows. The camera knows where it is: its own place, and the
-marker's on the hand, are exact. A kinematic simulation: the arm does what it is told for 1/rate.
+of them, and a `sigmaik.Servo` at 1 kHz, with all limits on, follows. The camera knows where it is: its own place, and
+the marker's on the hand, are exact. A kinematic simulation: the arm does what it is told for 1/rate.
 
 Units: m, rad, s.
 """
@@ -630,7 +630,14 @@ def _return_time(run: Follow) -> float:
     times = [math.nan]
     for k in e.back:
         # Until it leaves again, or the stream stops, 5 s at most.
-        until = next((j for j in range(k, min(len(error), k + round(5.0 * rate))) if not e.reachable[j] or j == round(e.gap[0] * rate)), None)
+        until = next(
+            (
+                j
+                for j in range(k, min(len(error), k + round(5.0 * rate)))
+                if not e.reachable[j] or j == round(e.gap[0] * rate)
+            ),
+            None,
+        )
         part = error[k : k + round(5.0 * rate) if until is None else until]
         away = np.flatnonzero(part > BACK)
         times.append((int(away[-1]) + 1) / rate if len(away) else 0.0)
@@ -674,9 +681,9 @@ def save_track_summary(rows: Sequence[TrackSummary], file: pathlib.Path) -> path
 def save_follow(run: Follow, file: pathlib.Path) -> pathlib.Path:
     """An npz file, which numpy.load(file) reads.
 
-    t (N,), q (N + 1, n), qdot (N, n), tip (N + 1, 4, 4), target (N, 4, 4), asked (N, 3), reachable, judged, stale (N,) as in
-    `Follow` and `TrackExperiment`; frames' stamp, arrival, outlier (M,) and seen (M, 4, 4); joint_names, variant, settings
-    and camera (JSON), version.
+    t (N,), q (N + 1, n), qdot (N, n), tip (N + 1, 4, 4), target (N, 4, 4), asked (N, 3), reachable, judged, stale (N,)
+    as in `Follow` and `TrackExperiment`; frames' stamp, arrival, outlier (M,) and seen (M, 4, 4); joint_names, variant,
+    settings and camera (JSON), version.
     """
     e = run.experiment
 

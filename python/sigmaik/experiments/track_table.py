@@ -31,7 +31,17 @@ def headline(e: TrackExperiment) -> str:
 def error_table(rows: Sequence[TrackSummary], by: By) -> Table:
     """Errors against the true target: mean, of 95 % of the time, largest; and the tip's delay."""
     table = _table(f"{_title(rows, by)}: errors within reach and outside [mm, °]")
-    for head in ("pos.\nmean", "\n95 %", "\nmax", "ori.\nmean", "\n95 %", "\nmax", "out-\nside", "back\ns", "delay\nms"):
+    for head in (
+        "pos.\nmean",
+        "\n95 %",
+        "\nmax",
+        "ori.\nmean",
+        "\n95 %",
+        "\nmax",
+        "out-\nside",
+        "back\ns",
+        "delay\nms",
+    ):
         table.add_column(head, justify="right", no_wrap=True)
     for row in rows:
         table.add_row(

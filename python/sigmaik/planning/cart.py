@@ -49,8 +49,8 @@ class CartMotion:
     corner_x: Array = field(repr=False)
     """(K,) [m] there."""
     multipliers: Array | None = field(repr=False)
-    """(M,) [m] μ_i = 2x_i − x_{i−1} − x_{i+1} of the exact law: > 0 only where it is held up by λ+ or the cart's range, < 0
-    only where it is held down, 0 elsewhere (not where the acceleration is limited); else None."""
+    """(M,) [m] μ_i = 2x_i − x_{i−1} − x_{i+1} of the exact law: > 0 only where it is held up by λ+ or the cart's range,
+    < 0 only where it is held down, 0 elsewhere (not where the acceleration is limited); else None."""
     radius: float
     """[m] of the forbidden cylinder, without the margin."""
     margin: float
@@ -58,7 +58,8 @@ class CartMotion:
     duration: float
     """[s] from the first to the last sample."""
     energy: float
-    """[m²] Σ (x_{i+1} − x_i)²; with a corner between samples, of the steps that it makes, each over its part of a sample."""
+    """[m²] Σ (x_{i+1} − x_i)²; with a corner between samples, of the steps that it makes, each over its part of a
+    sample."""
     admissible: bool
     """No sample is within the radius."""
     clearance: float
@@ -123,17 +124,18 @@ def cart_motion(
 ) -> CartMotion:
     """A law of the cart that keeps a point of the arm out of a cylinder about the first joint's axis.
 
-    The frame has x along the cart, z along the first joint's axis, which stands at (x_C, 0), y right-handed. "exact" finds
-    the law of the least Σ (x_{i+1} − x_i)² outside the forbidden intervals
+    The frame has x along the cart, z along the first joint's axis, which stands at (x_C, 0), y right-handed. "exact"
+    finds the law of the least Σ (x_{i+1} − x_i)² outside the forbidden intervals
 
         λ∓_i = x_P ∓ √(r² − y_P²),   λ−_i < x_C < λ+_i  where |y_P| < r          (Salvato et al. 2022, eq. 6)
 
-    to rounding, in O(M): the taut string in the tube that is left once the sides are chosen, and the best sides by branch
-    and bound. Of all laws with these sides it has the least top speed too. It touches the cylinder: `margin` keeps it off.
+    to rounding, in O(M): the taut string in the tube that is left once the sides are chosen, and the best sides by
+    branch and bound. Of all laws with these sides it has the least top speed too. It touches the cylinder: `margin`
+    keeps it off.
 
     "gradient" is the paper's descent on Σ H(x_i) + alpha Σ (x_{i+1} − x_i)² (10), H rising from 0 at the border to 1 on
-    the centre line. It may end inside the region, and says so: ``admissible`` is False then. It knows no limits, no sides
-    and no turn.
+    the centre line. It may end inside the region, and says so: ``admissible`` is False then. It knows no limits, no
+    sides and no turn.
 
     Parameters
     ----------
@@ -147,9 +149,9 @@ def cart_motion(
     alpha
         [1/mm²] weight of smoothness, between samples: the paper's, where lengths are in mm. Results depend on M.
     turn
-        [rad] that joint 1 turns through from the first to the last sample. Laws that turn the point's azimuth by another
-        number of whole turns are left out: they would bring the arm to its last pose, but not its taught joints.
-        None: the winding is not checked.
+        [rad] that joint 1 turns through from the first to the last sample. Laws that turn the point's azimuth by
+        another number of whole turns are left out: they would bring the arm to its last pose, but not its taught
+        joints. None: the winding is not checked.
     cart_range
         [m] (lowest, highest) position of the cart.
     margin
@@ -157,14 +159,14 @@ def cart_motion(
     duration
         [s] from the first to the last sample. The limits count in it.
     max_speed, max_acceleration
-        [m/s], [m/s²] of the cart, second differences over the samples. A law within the speed limit is found if there is one.
-        Where the law of the least energy accelerates too much, the one of the least energy that does not takes its place, on
-        the same sides, by an interior-point method; other sides are not tried.
+        [m/s], [m/s²] of the cart, second differences over the samples. A law within the speed limit is found if there
+        is one. Where the law of the least energy accelerates too much, the one of the least energy that does not takes
+        its place, on the same sides, by an interior-point method; other sides are not tried.
     at_rest
         Start and stop within max_acceleration, where that is finite.
     first_guess
-        Of the gradient descent: "linear" from start to end; "admissible", a jump past the region and back at the end, to
-        the cart's range where it is finite; or (M,) [m]. From an inadmissible guess the descent stops at the first
+        Of the gradient descent: "linear" from start to end; "admissible", a jump past the region and back at the end,
+        to the cart's range where it is finite; or (M,) [m]. From an inadmissible guess the descent stops at the first
         admissible law; from an admissible one it goes on smoothing.
     step
         [mm²] of the gradient descent; stable below 1/(4 alpha), by default 1/(5 alpha).
@@ -174,9 +176,10 @@ def cart_motion(
     Raises
     ------
     CartError
-        A ValueError, where no law keeps out of the region: `reason` is "start inside", "end inside", "opposite sides" (of
-        a region that reaches from the first to the last sample), "range", "winding", "speed", "acceleration" or "undecided"
-        (too many parts of the region); `feasible_radius` [m] the largest radius that would do, nan where none or unknown.
+        A ValueError, where no law keeps out of the region: `reason` is "start inside", "end inside", "opposite sides"
+        (of a region that reaches from the first to the last sample), "range", "winding", "speed", "acceleration" or
+        "undecided" (too many parts of the region); `feasible_radius` [m] the largest radius that would do, nan where
+        none or unknown.
     ValueError
         where an argument is out of its range.
     """
@@ -219,7 +222,9 @@ def cart_motion(
         raise ValueError(f"alpha = {alpha} 1/mm² must be finite and greater than 0")
     step = 1.0 / (5.0 * alpha) if step is None else step
     if not 0.0 < step < 1.0 / (4.0 * alpha):
-        raise ValueError(f"step = {step} mm² must be between 0 and 1/(4 alpha) = {1.0 / (4.0 * alpha)} mm², to be stable")
+        raise ValueError(
+            f"step = {step} mm² must be between 0 and 1/(4 alpha) = {1.0 / (4.0 * alpha)} mm², to be stable"
+        )
     path = planar_path(flange_xy)
     if not (math.isfinite(margin) and margin >= 0.0):
         raise ValueError(f"margin = {margin} m must be finite and not negative")

@@ -21,8 +21,9 @@ PosePath = Callable[[Array], Array]
 def pose_paths(poses: Array, via: Sequence[ArrayLike | None] | None, spline: bool) -> list[PosePath]:
     """From each of N poses (N, 4, 4) to the next.
 
-    Positions on a line, or where `via` has a point (3,) [m] on the circular arc through it, at constant speed; or all on one
-    natural cubic spline over chord lengths. Orientations turn about one axis at constant speed, by at most half a turn.
+    Positions on a line, or where `via` has a point (3,) [m] on the circular arc through it, at constant speed; or all
+    on one natural cubic spline over chord lengths. Orientations turn about one axis at constant speed, by at most half
+    a turn.
     """
     count = len(poses) - 1
     if via is not None and len(via) != count:
@@ -88,7 +89,8 @@ def _arc(a: Array, via: ArrayLike | None, b: Array) -> Callable[[Array], Array]:
 
 
 def _spline(points: Array) -> list[Callable[[Array], Array]]:
-    """Second derivatives m from h_{k−1} m_{k−1} + 2(h_{k−1} + h_k) m_k + h_k m_{k+1} = 6(d_k − d_{k−1}), zero at the ends."""
+    """Second derivatives m from h_{k−1} m_{k−1} + 2(h_{k−1} + h_k) m_k + h_k m_{k+1} = 6(d_k − d_{k−1}), zero at the
+    ends."""
     h = np.linalg.norm(np.diff(points, axis=0), axis=1)
     if np.any(h == 0.0):
         raise ValueError("a spline needs neighbouring positions that differ")

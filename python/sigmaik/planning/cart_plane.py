@@ -29,8 +29,8 @@ class PlaneCartMotion:
     flange_xy: Array = field(repr=False)
     """(M, 2) [m] the path that was given."""
     push: Array | None = field(repr=False)
-    """(M,) [m] ≥ 0, |2c_i − c_{i−1} − c_{i+1}| where the cart c touches the disc about the point, away from it, else 0. At an
-    optimum without limits the cart bends nowhere else. None for a motion that was only looked at."""
+    """(M,) [m] ≥ 0, |2c_i − c_{i−1} − c_{i+1}| where the cart c touches the disc about the point, away from it, else 0.
+    At an optimum without limits the cart bends nowhere else. None for a motion that was only looked at."""
     radius: float
     """[m] of the forbidden disc, without the margin."""
     margin: float
@@ -100,16 +100,18 @@ def cart_motion_plane(
     max_acceleration: float | ArrayLike = math.inf,
     at_rest: bool = False,
 ) -> PlaneCartMotion:
-    """A motion of a cart with two linear axes that keeps a point of the arm out of a cylinder about the first joint's axis.
+    """A motion of a cart with two linear axes that keeps a point of the arm out of a cylinder about the first joint's
+    axis.
 
-    What `cart_motion` does for one axis: the least Σ |c_{i+1} − c_i|² with |c_i − flange_i| ≥ radius + margin. Seen from the
-    point, the cart goes round a disc at rest; either way round is open to it, and they differ by a whole turn of joint 1.
+    What `cart_motion` does for one axis: the least Σ |c_{i+1} − c_i|² with |c_i − flange_i| ≥ radius + margin. Seen
+    from the point, the cart goes round a disc at rest; either way round is open to it, and they differ by a whole turn
+    of joint 1.
 
-    For a flange on a straight line at constant speed there is one optimum for each number of turns: seen from the flange,
-    tangent, arc, tangent. Other paths can have several; from a bounded number of starts (the straight motion taken round
-    either side wherever it runs into the disc; tangent, arc, tangent) the best is returned. It meets the conditions of Karush,
-    Kuhn and Tucker: free of the disc the cart moves straight at constant speed, and on it only the disc pushes. That no other
-    way is better is not proven.
+    For a flange on a straight line at constant speed there is one optimum for each number of turns: seen from the
+    flange, tangent, arc, tangent. Other paths can have several; from a bounded number of starts (the straight motion
+    taken round either side wherever it runs into the disc; tangent, arc, tangent) the best is returned. It meets the
+    conditions of Karush, Kuhn and Tucker: free of the disc the cart moves straight at constant speed, and on it only
+    the disc pushes. That no other way is better is not proven.
 
     Parameters
     ----------
@@ -120,20 +122,21 @@ def cart_motion_plane(
     radius
         [m] of the cylinder.
     turn
-        [rad] that joint 1 turns through. Motions that turn the point's azimuth by another number of whole turns are left out:
-        they would not bring the arm to its taught joints. None: the winding is free.
+        [rad] that joint 1 turns through. Motions that turn the point's azimuth by another number of whole turns are
+        left out: they would not bring the arm to its taught joints. None: the winding is free.
     x_range, y_range
         [m] (lowest, highest) position of each axis. Where both are the same the axis stands.
     max_radius
         [m] greater than radius + margin: the arm's reach, the farthest that the point may be from axis 1.
     margin
-        [m] added to the radius in planning. Between samples the point can be nearer than radius + margin by (r/8) of the
-        square of the angle that a step turns it by; `clearance` tells.
+        [m] added to the radius in planning. Between samples the point can be nearer than radius + margin by (r/8) of
+        the square of the angle that a step turns it by; `clearance` tells.
     duration
         [s] from the first to the last sample. The limits count in it.
     max_speed, max_acceleration
-        [m/s], [m/s²] of each axis, one number for both or (2,); accelerations are second differences over the samples. Where
-        the best motion does not keep to them, the one of the least energy that does takes its place, along the same way.
+        [m/s], [m/s²] of each axis, one number for both or (2,); accelerations are second differences over the samples.
+        Where the best motion does not keep to them, the one of the least energy that does takes its place, along the
+        same way.
     at_rest
         Start and stop within max_acceleration, where that is finite.
 

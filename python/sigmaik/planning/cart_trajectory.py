@@ -1,4 +1,5 @@
-"""A cart-mounted arm through taught configurations, clear of its shoulder singularity (Salvato et al. 2022, algorithm 1)."""
+"""A cart-mounted arm through taught configurations, clear of its shoulder singularity (Salvato et al. 2022, algorithm
+1)."""
 
 from __future__ import annotations
 
@@ -44,12 +45,13 @@ class ShoulderCylinder:
 def shoulder_cylinder(chain: Chain) -> ShoulderCylinder:
     """The point and the radius that make a shoulder singularity a cylinder about axis 1, whatever the orientation.
 
-    Where axes 5 and 6 meet, the point moves in a plane at right angles to axis 2, which is at a fixed distance d from axis
-    1: its distance from axis 1 is √(g² + d²), and the arm is singular where g = 0. For a Universal Robots arm, d = d4 and
+    Where axes 5 and 6 meet, the point moves in a plane at right angles to axis 2, which is at a fixed distance d from
+    axis 1: its distance from axis 1 is √(g² + d²), and the arm is singular where g = 0. For a Universal Robots arm, d =
+    d4 and
     |det J| = a2 a3 |s3 s5 g|. For arms with a spherical wrist the point is the wrist's centre.
 
-    Raises ValueError where the arm has not six joints, its axes 5 and 6 do not meet, axis 2 is not at right angles to axis 1,
-    or the point does not move in such a plane.
+    Raises ValueError where the arm has not six joints, its axes 5 and 6 do not meet, axis 2 is not at right angles to
+    axis 1, or the point does not move in such a plane.
     """
     if chain.dof != 6:
         raise ValueError(f"a shoulder cylinder needs six joints; the arm has {chain.dof}")
@@ -135,10 +137,10 @@ def cart_trajectory(
 ) -> CartTrajectory:
     """From taught configuration to taught configuration along Cartesian motions, arriving at the taught joints.
 
-    For each pair of neighbours: the tool's motion p(t); the law of the cart that keeps `point` more than `radius` from the
-    first joint's axis, on the side that turns joint 1 as taught (`cart_motion`); the arm's inverse kinematics on p(t)
-    shifted by the cart (9), continuous from the taught start; and a check that it arrives at the taught joints, not at
-    another branch or another turn.
+    For each pair of neighbours: the tool's motion p(t); the law of the cart that keeps `point` more than `radius` from
+    the first joint's axis, on the side that turns joint 1 as taught (`cart_motion`); the arm's inverse kinematics on
+    p(t) shifted by the cart (9), continuous from the taught start; and a check that it arrives at the taught joints,
+    not at another branch or another turn.
 
     Parameters
     ----------
@@ -151,8 +153,8 @@ def cart_trajectory(
     poses
         (N, 4, 4) of the tool where they were taught, x along the cart; by default those of `taught`.
     point
-        (3,) [m] of the arm in the tip's frame, that is to stay out of the cylinder. The default, the tip's origin, is the
-        paper's. `shoulder_cylinder(chain)` has the point and the least radius that suit the arm.
+        (3,) [m] of the arm in the tip's frame, that is to stay out of the cylinder. The default, the tip's origin, is
+        the paper's. `shoulder_cylinder(chain)` has the point and the least radius that suit the arm.
     mount
         (4, 4) base of the chain on the cart, at cart position 0; by default the cart's frame.
     tool
@@ -181,7 +183,8 @@ def cart_trajectory(
     CartError
         where no law of the cart keeps out of the cylinder; see `cart_motion`.
     ValueError
-        where the arm cannot follow, arrives at other joints, or leaves its limits; or where an argument is out of its range.
+        where the arm cannot follow, arrives at other joints, or leaves its limits; or where an argument is out of its
+        range.
     """
     if chain.dof != 6:
         raise ValueError(f"the arm must have six joints, not {chain.dof}: a redundant one has no joints to arrive at")
@@ -266,10 +269,11 @@ def cart_trajectory(
 
 
 def follow(chain: Chain, pose_at: Callable[[float], Array], times: Array, start: Array) -> tuple[Array, int]:
-    """Joints (K, n) that follow tip poses, continuous from `start`, by Newton's method, and how many times were reached.
+    """Joints (K, n) that follow tip poses, continuous from `start`, by Newton's method, and how many times were
+    reached.
 
-    pose_at(t) is the tip's pose (4, 4) in the base. Where a step moves a joint far, or Newton's method does not get there,
-    it is halved, time and again; where that does not help either, what was reached is returned.
+    pose_at(t) is the tip's pose (4, 4) in the base. Where a step moves a joint far, or Newton's method does not get
+    there, it is halved, time and again; where that does not help either, what was reached is returned.
     """
     q = np.array(start, dtype=np.float64)
     found = [q]
@@ -352,7 +356,8 @@ def _least(chain: Chain, q: Array) -> Array:
 
 
 def _rates(t: Array, q: Array, taught_at: list[int]) -> Array:
-    """Differences within each motion: at a taught configuration the rate may jump, and is that of the motion that begins."""
+    """Differences within each motion: at a taught configuration the rate may jump, and is that of the motion that
+    begins."""
     out = np.empty_like(q)
     for first, last in zip(taught_at[:-1], taught_at[1:], strict=True):
         part = slice(first, last + 1)

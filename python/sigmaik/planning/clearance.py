@@ -1,8 +1,8 @@
 """How near a motion comes to singularities, between its nodes too: a grid can step over a singular set unseen.
 
 A set of codimension 1, a wall in the joints' space, has a signed residual. Where it differs in sign between start and
-goal, every path crosses the wall: such a crossing is unavoidable. One of an even number of crossings is not, and nothing
-of higher codimension is: there is a way round.
+goal, every path crosses the wall: such a crossing is unavoidable. One of an even number of crossings is not, and
+nothing of higher codimension is: there is a way round.
 """
 
 from __future__ import annotations
@@ -24,7 +24,8 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Crossing:
-    """A motion that goes through a singular set, or so near by that the set's potential does not tell the difference."""
+    """A motion that goes through a singular set, or so near by that the set's potential does not tell the
+    difference."""
 
     name: str
     """Of the set."""
@@ -77,9 +78,7 @@ class Clearance:
         return tuple(c for c in self.crossings if c.avoidable)
 
 
-def clearance(
-    chain: Chain, sets: SingularSets | None, t: Array, q: Array, *, width: float = 400.0
-) -> Clearance:
+def clearance(chain: Chain, sets: SingularSets | None, t: Array, q: Array, *, width: float = 400.0) -> Clearance:
     """Clearance of a densely sampled motion.
 
     t (M,) [s], q (M, n). `width` is η₂ [1/rad²]: sets of codimension above 1 count as crossed where ψ < 1/(2η₂) in
@@ -114,7 +113,9 @@ def _wall(name: str, t: Array, q: Array, r: Array) -> list[Crossing]:
         s = r[k] / (r[k] - r[k + 1])
         # Of an odd number one has to be; which of them is for nobody to say: the first is taken.
         found.append(
-            Crossing(name, float(t[k] + s * (t[k + 1] - t[k])), q[k] + s * (q[k + 1] - q[k]), 0.0, not (needed and j == 0))
+            Crossing(
+                name, float(t[k] + s * (t[k + 1] - t[k])), q[k] + s * (q[k + 1] - q[k]), 0.0, not (needed and j == 0)
+            )
         )
     return found
 

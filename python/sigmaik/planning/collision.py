@@ -21,10 +21,10 @@ def arm_spheres(chain: Chain, source: str | os.PathLike[str] | None = None, radi
     """An arm as spheres fixed to its links.
 
     source
-        The URDF that the chain was read from, as a path or as XML, e.g. ``sk.robots.path(name)``. The boxes, cylinders and
-        spheres of its ``<collision>`` elements, or where a link has none of its ``<visual>`` ones, are covered whole: a
-        cylinder by spheres at most 12 % wider than itself. Links that fixed joints carry beside the arm are part of it.
-        None: capsules from each link's frame to the next.
+        The URDF that the chain was read from, as a path or as XML, e.g. ``sk.robots.path(name)``. The boxes, cylinders
+        and spheres of its ``<collision>`` elements, or where a link has none of its ``<visual>`` ones, are covered
+        whole: a cylinder by spheres at most 12 % wider than itself. Links that fixed joints carry beside the arm are
+        part of it. None: capsules from each link's frame to the next.
     radius
         [m] > 0 of these capsules, and of those of links that have meshes.
 

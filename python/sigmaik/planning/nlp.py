@@ -119,7 +119,10 @@ def _build(n: int, sets: str | None, chain: Chain | None, o: Objective) -> Any:
                     jacobian = _jacobian(casadi, chain, joints)
                     square = casadi.det(jacobian @ jacobian.T)
                 cost += o.avoid_weight / (casadi.sqrt(casadi.fmax(square, 1e-30)) + o.epsilon)
-    gaps = [q[:, :-1] + h * qdot[:, :-1] + h * h / 2 * qddot[:, :-1] - q[:, 1:], qdot[:, :-1] + h * qddot[:, :-1] - qdot[:, 1:]]
+    gaps = [
+        q[:, :-1] + h * qdot[:, :-1] + h * h / 2 * qddot[:, :-1] - q[:, 1:],
+        qdot[:, :-1] + h * qddot[:, :-1] - qdot[:, 1:],
+    ]
     problem = {
         "x": casadi.vertcat(t, casadi.vec(q), casadi.vec(qdot), casadi.vec(qddot)),
         "f": cost,
@@ -136,7 +139,8 @@ _solvers = _Solvers()
 
 
 def _jacobian(casadi: Any, chain: Chain, q: list[Any]) -> Any:
-    """6×n in the last frame but one's axes, from the screws at q = 0 (product of exponentials): det(JJᵀ) is the same."""
+    """6×n in the last frame but one's axes, from the screws at q = 0 (product of exponentials): det(JJᵀ) is the
+    same."""
     zero = chain.jacobian(np.zeros(chain.dof))
     tip = chain.pose(np.zeros(chain.dof))[:3, 3]
     columns: list[Any] = []

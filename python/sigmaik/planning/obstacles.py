@@ -114,8 +114,8 @@ class Obstacles:
         obstacles = sk.planning.Obstacles([table, ball])
         obstacles.distance(points), obstacles.gradient(points)     # (M,), (M, 3) at points (M, 3)
 
-    A node's distance is exact outside all shapes; where shapes overlap, a depth is that in the deepest of them. Between the
-    nodes it is interpolated, wrong by at most √3/2 `resolution`; outside the grid it is a bound from below of the
+    A node's distance is exact outside all shapes; where shapes overlap, a depth is that in the deepest of them. Between
+    the nodes it is interpolated, wrong by at most √3/2 `resolution`; outside the grid it is a bound from below of the
     distance to what lies within (see `DistanceField`).
     """
 
@@ -136,9 +136,9 @@ class Obstacles:
         Parameters
         ----------
         bounds
-            (2, 3) [m]: lowest and highest corner of the grid. By default the box around all shapes and `margin` [m]. Give
-            bounds where shapes are larger than what the arm can reach, e.g. a floor; what they cut off counts as free
-            beyond them.
+            (2, 3) [m]: lowest and highest corner of the grid. By default the box around all shapes and `margin` [m].
+            Give bounds where shapes are larger than what the arm can reach, e.g. a floor; what they cut off counts as
+            free beyond them.
         margin
             [m] ≥ 0. Beyond it distances are bounds, so it should be more than a cost's clearance and the arm's thickest
             sphere together.
@@ -186,9 +186,9 @@ class Obstacles:
     def from_occupancy(cls, occupied: ArrayLike, origin: ArrayLike, cell: float) -> Obstacles:
         """From an occupancy grid, by the Euclidean distance transform of SciPy (extra ``obstacles``).
 
-        occupied (X, Y, Z), true where there is something; `origin` (3,) [m] the centre of cell (0, 0, 0) in the base's axes;
-        `cell` [m] a cell's side. A surface lies half a cell from the centres on either side of it, exact where it is
-        parallel to an axis; elsewhere a distance is up to 0.37 cells too large outside, and too deep inside.
+        occupied (X, Y, Z), true where there is something; `origin` (3,) [m] the centre of cell (0, 0, 0) in the base's
+        axes; `cell` [m] a cell's side. A surface lies half a cell from the centres on either side of it, exact where it
+        is parallel to an axis; elsewhere a distance is up to 0.37 cells too large outside, and too deep inside.
 
         Error where no cell is occupied, or none is free; where SciPy is not installed, with the name of the extra.
         """

@@ -59,17 +59,19 @@ class Playback:
 
 
 def play(trajectory: Trajectory, servo: Servo, *, settle: float = 0.5) -> Playback:
-    """Plays a planned motion through a servo that stands at its start, as poses with feed-forward twists, at the servo's dt.
+    """Plays a planned motion through a servo that stands at its start, as poses with feed-forward twists, at the
+    servo's dt.
 
-    In the cycle from t to t + dt the target is the pose planned for t, where the tip should be by now, and the feed-forward
-    J(q) q̇ of the plan in the middle of the cycle: what a cycle of constant q̇ leaves is ½ dt² J̇ q̇, and the gains keep it to
-    ½ dt |J̇ q̇| / gain, micrometres at 1 kHz. The soft start costs more. The servo holds its limits and treats singularities
-    by its own rule, so it may leave the plan, and comes back by its gains.
+    In the cycle from t to t + dt the target is the pose planned for t, where the tip should be by now, and the
+    feed-forward J(q) q̇ of the plan in the middle of the cycle: what a cycle of constant q̇ leaves is ½ dt² J̇ q̇, and
+    the gains keep it to ½ dt |J̇ q̇| / gain, micrometres at 1 kHz. The soft start costs more. The servo holds its
+    limits and treats singularities by its own rule, so it may leave the plan, and comes back by its gains.
     It goes on from where it is: call `servo.reset` before.
 
     settle: [s] for which the last pose is held
 
-    ValueError where the trajectory is empty or has other joints, the servo stands elsewhere, or settle is out of its range.
+    ValueError where the trajectory is empty or has other joints, the servo stands elsewhere, or settle is out of its
+    range.
     """
     chain, dt = servo.chain, servo.dt
     if trajectory.q.ndim != 2 or trajectory.q.shape[1] != chain.dof:

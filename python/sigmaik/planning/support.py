@@ -56,17 +56,18 @@ def gradient(
 ) -> Trajectory:
     """A smooth motion from start to goal along which an index is good, by the gradient of its cost.
 
-    Minimises ``Σ_i cost(q_i) + prior_weight ‖q − μ‖²`` over N + 1 support states, the norm that of the inverse covariance of
-    a Gaussian process with white noise on acceleration about the straight line μ (Petrović et al., eqs. 7 to 13), by L-BFGS
-    in coordinates where the prior is a unit ball. Between states the prior's mean, the natural cubic spline, is the motion.
+    Minimises ``Σ_i cost(q_i) + prior_weight ‖q − μ‖²`` over N + 1 support states, the norm that of the inverse
+    covariance of a Gaussian process with white noise on acceleration about the straight line μ (Petrović et al., eqs. 7
+    to 13), by L-BFGS in coordinates where the prior is a unit ball. Between states the prior's mean, the natural cubic
+    spline, is the motion.
 
     Parameters
     ----------
     start, goal
         (n,) [rad or m] within the limits. Whole turns count.
     obstacles
-        What to keep clear of. ValueError where start or goal touches it; where the motion found does, `status` is "failed"
-        and there are no samples.
+        What to keep clear of. ValueError where start or goal touches it; where the motion found does, `status` is
+        "failed" and there are no samples.
     spheres
         The arm as spheres; by default `arm_spheres(chain)`, capsules along its links.
     margin
@@ -76,16 +77,16 @@ def gradient(
     self_collision
         Whether the arm keeps clear of itself too.
     index
-        "geometry_aware": ``weight ξ(q)``, ξ with Σ = kI (12), cut off at 2000. "manipulability": ``−weight log m(q)``, as in
-        manipulability maximisation over a Gaussian-process trajectory (after Marić et al. 2019). None: neither.
+        "geometry_aware": ``weight ξ(q)``, ξ with Σ = kI (12), cut off at 2000. "manipulability": ``−weight log m(q)``,
+        as in manipulability maximisation over a Gaussian-process trajectory (after Marić et al. 2019). None: neither.
     k
         by default `indices.reference_scale(chain)`.
     costs
         Further costs of the states, added up: any `JointCost`, or one written in Python (`BatchCost`).
     restarts
-        ≥ 0. Where the motion found from the straight line touches an obstacle, so many others are found from first guesses
-        drawn from the prior, the same each time, with a standard deviation of 0.5 rad or m half-way, and the one of least
-        cost that touches none is the answer.
+        ≥ 0. Where the motion found from the straight line touches an obstacle, so many others are found from first
+        guesses drawn from the prior, the same each time, with a standard deviation of 0.5 rad or m half-way, and the
+        one of least cost that touches none is the answer.
     duration
         [s]; by default the shortest that keeps the limits of velocity and acceleration, 1 s where there are none.
 
@@ -98,8 +99,8 @@ def gradient(
     Raises
     ------
     ValueError
-        where an end or an option is out of its range, or a cost's answer has another shape or is not finite. What a cost
-        written in Python raises comes through as it is.
+        where an end or an option is out of its range, or a cost's answer has another shape or is not finite. What a
+        cost written in Python raises comes through as it is.
     """
     if restarts < 0:
         raise ValueError(f"restarts = {restarts} must be at least 0")
@@ -154,12 +155,12 @@ def stochastic(
 ) -> Trajectory:
     """A smooth motion from start to goal along which an index is good, by samples (Petrović et al., eqs. 14 to 16).
 
-    The cost is that of `gradient`, and so are the parameters that have the same names. Each iteration draws `samples` motions
-    about the current one from the prior, of standard deviation `deviation` [rad or m] half-way, which `decay` shrinks, and
-    moves it by their mean, weighted by exp(−(G − G_min)/(`temperature` (G_max − G_min))) and spread by the covariance, as STOMP
-    does. The best motion that was met is returned. It ends after `max_iterations`, or where eight together gain less than the
-    part `tolerance` of the objective. It needs no gradient, and can leave a local minimum; without obstacles `gradient` is
-    faster and as good.
+    The cost is that of `gradient`, and so are the parameters that have the same names. Each iteration draws `samples`
+    motions about the current one from the prior, of standard deviation `deviation` [rad or m] half-way, which `decay`
+    shrinks, and moves it by their mean, weighted by exp(−(G − G_min)/(`temperature` (G_max − G_min))) and spread by the
+    covariance, as STOMP does. The best motion that was met is returned. It ends after `max_iterations`, or where eight
+    together gain less than the part `tolerance` of the objective. It needs no gradient, and can leave a local minimum;
+    without obstacles `gradient` is faster and as good.
 
     seed
         of the samples: the same seed gives the same motion.

@@ -83,13 +83,13 @@ def time_optimal(
     generic_manipulability
         Take m from the Jacobian though a closed form is known: what an arm without one costs.
     between_nodes
-        Keep the limits of position between the nodes too, where a parabola can overshoot; False: at the nodes alone, as in
-        the paper. IPOPT's problem is always the paper's.
+        Keep the limits of position between the nodes too, where a parabola can overshoot; False: at the nodes alone, as
+        in the paper. IPOPT's problem is always the paper's.
     restarts
         Where the motion found still leads through what is to be avoided, look on the other sides too.
     solver
-        "sigmaik": an interior-point method made for this problem. "ipopt": IPOPT with MUMPS by CasADi (extra `plan`), for
-        comparison; one start, `tolerance` is its own, relative to its scaled problem.
+        "sigmaik": an interior-point method made for this problem. "ipopt": IPOPT with MUMPS by CasADi (extra `plan`),
+        for comparison; one start, `tolerance` is its own, relative to its scaled problem.
 
     Returns
     -------
@@ -156,9 +156,7 @@ def _solve(
         starts = 1
     if status == "failed":
         empty = np.empty((0, chain.dof))
-        return Trajectory(
-            np.empty(0), empty, empty, empty, math.nan, status, math.nan, solve_time, iterations, starts
-        )
+        return Trajectory(np.empty(0), empty, empty, empty, math.nan, status, math.nan, solve_time, iterations, starts)
     t = np.arange(len(q), dtype=np.float64) * (duration / len(q))
     plan = Trajectory(t, q, qdot, qddot, duration, status, cost, solve_time, iterations, starts)
     dense = np.linspace(0.0, t[-1], DENSE * (len(t) - 1) + 1)
@@ -209,8 +207,8 @@ def _other_sides(
 ) -> Trajectory:
     """Starts once more on the other side of the first crossing that could be avoided, and keeps the better motion.
 
-    The better one is that with the smaller objective along the whole way, not only at the nodes: these can lie on either
-    side of a wall that the motion between them goes through.
+    The better one is that with the smaller objective along the whole way, not only at the nodes: these can lie on
+    either side of a wall that the motion between them goes through.
     """
     assert plan.clearance is not None
     bend = BEND * _other_side(sets, plan.clearance.avoidable[0], np.asarray(ends[0], dtype=np.float64))

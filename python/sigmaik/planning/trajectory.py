@@ -38,7 +38,8 @@ class Trajectory:
     qdot: Array = field(repr=False)
     """(N, n) [rad/s or m/s]"""
     qddot: Array = field(repr=False)
-    """(N, n) [rad/s² or m/s²], of the step that begins at the sample, zero in the last row; where `cubic`, at the sample."""
+    """(N, n) [rad/s² or m/s²], of the step that begins at the sample, zero in the last row; where `cubic`, at the
+    sample."""
     duration: float
     """[s]; nan where the plan failed. See the planner for what it counts."""
     status: str
@@ -116,14 +117,19 @@ class Trajectory:
         about = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in (*_ARRAYS, "clearance")}
         near = self.clearance
         if near is not None:
-            arrays |= {"clearance_t": near.t, "clearance_manipulability": near.manipulability, "clearance_psi": near.psi}
+            arrays |= {
+                "clearance_t": near.t,
+                "clearance_manipulability": near.manipulability,
+                "clearance_psi": near.psi,
+            }
             about["clearance"] = {
                 "names": near.names,
                 "crossings": [{**asdict(c), "q": c.q.tolist()} for c in near.crossings],
             }
         text = np.array(json.dumps(about))
         return write_atomically(
-            pathlib.Path(file), lambda stream: np.savez_compressed(stream, about=text, **arrays)  # type: ignore[arg-type]
+            pathlib.Path(file),
+            lambda stream: np.savez_compressed(stream, about=text, **arrays),  # type: ignore[arg-type]
         )
 
     @staticmethod

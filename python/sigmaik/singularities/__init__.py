@@ -8,8 +8,8 @@
 
     sk.singularities.find(chain)  # any arm, numerically
 
-The known sets are those of Beck et al. (2022) for the Comau Racer 7-1.4, the KUKA LBR iiwa 14 R820 and the Franka Emika Panda,
-corrected where they do not hold as printed, and with one of the Panda that is missing there.
+The known sets are those of Beck et al. (2022) for the Comau Racer 7-1.4, the KUKA LBR iiwa 14 R820 and the Franka Emika
+Panda, corrected where they do not hold as printed, and with one of the Panda that is missing there.
 """
 
 from __future__ import annotations
@@ -44,7 +44,8 @@ def load(name: str) -> SingularSets:
 
 
 def of(chain: Chain) -> SingularSets | None:
-    """The known singular sets of a chain that has the kinematics of one of these arms, whatever its base, tool and names.
+    """The known singular sets of a chain that has the kinematics of one of these arms, whatever its base, tool and
+    names.
 
     None for any other: its axes are compared, so another zero of a joint inside the arm is another arm.
     """

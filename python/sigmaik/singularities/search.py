@@ -3,8 +3,8 @@
 An arm is singular at q where some unit vector u of twists cannot be made: J(q)ᵀu = 0. In (q, u) this is a smooth system
 with many more unknowns than equations; from a random start, Newton's method in its least-norm form, damped far from a
 solution, converges to a nearby one, quadratically. At what it finds, with N a basis of the null space of J, the set's
-tangent space is where Nᵀ ∂(Jᵀu)/∂q δq = 0: the rank of that matrix is the set's codimension, and the joints whose columns
-are not zero are those that its condition is about.
+tangent space is where Nᵀ ∂(Jᵀu)/∂q δq = 0: the rank of that matrix is the set's codimension, and the joints whose
+columns are not zero are those that its condition is about.
 """
 
 from __future__ import annotations
@@ -46,10 +46,10 @@ class FoundSet:
 def find(chain: Chain, starts: int = 2000, seed: int = 0) -> list[FoundSet]:
     """Singular sets of a chain within its joint ranges, the most often found first.
 
-    `starts` random configurations are drawn there (within ±π where a joint has no limits). Sets of a high codimension, or
-    in a corner of the ranges, are found seldom, and may be missed: many starts are evidence of completeness, no proof. Two
-    sets with the same codimension and joints count as one. Where two sets meet, more than one twist is lost, and what is
-    found there is left out. A chain of fewer than six joints is singular everywhere: ValueError.
+    `starts` random configurations are drawn there (within ±π where a joint has no limits). Sets of a high codimension,
+    or in a corner of the ranges, are found seldom, and may be missed: many starts are evidence of completeness, no
+    proof. Two sets with the same codimension and joints count as one. Where two sets meet, more than one twist is lost,
+    and what is found there is left out. A chain of fewer than six joints is singular everywhere: ValueError.
     """
     q = singular_configurations(chain, starts, seed)
     groups: dict[tuple[int, tuple[int, ...]], list[Array]] = {}

@@ -74,10 +74,7 @@ def drill(
     finally:
         for session in sessions:
             session.__exit__()
-    return [
-        _drill(session, home, episode)
-        for session, home, episode in zip(sessions, homes, episodes, strict=True)
-    ]
+    return [_drill(session, home, episode) for session, home, episode in zip(sessions, homes, episodes, strict=True)]
 
 
 def _targets(home: Array) -> list[Array]:

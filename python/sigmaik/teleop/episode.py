@@ -7,7 +7,8 @@ As an npz file (numpy.load reads it, without pickles) it has an array of N rows 
     achieved_twist (N, 6), singular_values (N, min(6, n)), singular, limiting_joints (bits), scale
 
 and joint_names, lower, upper, velocity, acceleration (n,) (the limits, as they were held), home (n,), before (2, n)
-(q and q̇ before the first cycle), urdf (the arm's text), and meta: JSON with robot, base, tip, dt, settings (a configuration's number to its settings) and version.
+(q and q̇ before the first cycle), urdf (the arm's text), and meta: JSON with robot, base, tip, dt, settings (a
+configuration's number to its settings) and version.
 
 As a parquet file (extra `viewer`) it has a row a cycle and the columns that tools for imitation learning read:
 

@@ -119,5 +119,3 @@ def _box(inside: str) -> str:
         f"<div style='flex:1;position:relative;height:9px;background:{_TRACK};border-radius:2px;overflow:hidden'>"
         f"{inside}</div>"
     )
-
-

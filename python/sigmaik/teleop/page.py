@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-import sigmaik as sk
 from sigmaik.console import need
 from sigmaik.experiments import methods
 
@@ -230,7 +229,9 @@ class Page:
                 f"{self.session.acceleration:g} rad/s² is assumed."
             )
         if self._scene.robot.missing:
-            gui.add_markdown(f"{len(self._scene.robot.missing)} meshes were not found: simple shapes stand in for them.")
+            gui.add_markdown(
+                f"{len(self._scene.robot.missing)} meshes were not found: simple shapes stand in for them."
+            )
 
     def _build_record(self) -> None:
         gui = self._server.gui

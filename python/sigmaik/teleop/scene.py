@@ -48,9 +48,7 @@ def pose_of(position: Any, wxyz: Any) -> Array:
     return pose
 
 
-def singular_directions(
-    jacobian: Array, gamma: float, length_scale: float
-) -> tuple[Array, Array, NDArray[np.float64]]:
+def singular_directions(jacobian: Array, gamma: float, length_scale: float) -> tuple[Array, Array, NDArray[np.float64]]:
     """Directions u_i with σ_i ≤ γσ_max: their linear and their angular parts (k, 3), and all σ."""
     weighted = jacobian.copy()
     weighted[3:] *= length_scale
@@ -69,9 +67,7 @@ class Scene:
         server.initial_camera.look_at = tuple(self.reach * np.array([0.55, 0.15, 0.25]))
         scene.add_grid("/ground", 3.0 * self.reach, 3.0 * self.reach, cell_size=0.2, section_size=0.6)
         self.robot = RobotView(server, session.source, session.chain)
-        self.target = scene.add_transform_controls(
-            "/target", scale=0.22 * self.reach, depth_test=False, line_width=3.0
-        )
+        self.target = scene.add_transform_controls("/target", scale=0.22 * self.reach, depth_test=False, line_width=3.0)
         self.tool = scene.add_frame("/tool", axes_length=0.08 * self.reach, axes_radius=0.006 * self.reach)
         self.ellipsoid = scene.add_icosphere(
             "/ellipsoid", 1.0, color=(116, 192, 252), subdivisions=3, opacity=0.35, cast_shadow=False

@@ -15,7 +15,7 @@ inline constexpr int kMaxSpheres = 256;  ///< most spheres of an arm
 
 /// A sphere fixed to a link.
 struct LinkSphere {
-  int segment = 0;  ///< index into Chain::segments(); −1: the base
+  int segment = 0;                                   ///< index into Chain::segments(); −1: the base
   Eigen::Vector3d center = Eigen::Vector3d::Zero();  ///< [m] in the link frame
   double radius = 0.0;                               ///< [m] > 0
 };
@@ -40,8 +40,8 @@ class ArmSpheres {
   /// Covers the boxes, cylinders and spheres of a URDF whole: each link's <collision> shapes, or where it has none its
   /// <visual> ones. Links that fixed joints carry beside the arm are part of it, e.g. a tool behind the tip; movable
   /// branches are not. Links with meshes get spheres as by along_links(), links without any shape none. A cylinder of
-  /// radius r and length L becomes m = ⌈L/r⌉ spheres of radius √(r² + (L/2m)²), at most 1.12 r; a box small boxes, a sphere
-  /// each.
+  /// radius r and length L becomes m = ⌈L/r⌉ spheres of radius √(r² + (L/2m)²), at most 1.12 r; a box small boxes, a
+  /// sphere each.
   /// \param source a file's path, or the XML itself: what the chain was read from
   /// \param radius [m] > 0, of links with meshes
   /// \throws Error where the source is no URDF, does not hold this arm, or a shape's size is not positive
@@ -64,8 +64,8 @@ class ArmSpheres {
   /// \return false, with `state` unchanged, where q has a wrong size or is not finite
   bool update(const JointRef& q, SphereState& state) const noexcept;
 
-  /// ∂center_i/∂q (3, n): column k is z_k × (c_i − p_k), z_k where joint k is prismatic, and zero where joint k does not
-  /// move the sphere. Real time.
+  /// ∂center_i/∂q (3, n): column k is z_k × (c_i − p_k), z_k where joint k is prismatic, and zero where joint k does
+  /// not move the sphere. Real time.
   void jacobian(int i, const SphereState& state, PointJacobian& jacobian) const noexcept;
 
   /// directionᵀ ∂center_i/∂q, the first joints(i) entries of `row`. Real time.

@@ -16,8 +16,8 @@ class BatchCost {
   /// Number of joints, n.
   virtual int dof() const noexcept = 0;
 
-  /// Values, and gradients where `gradient` is not null, at `count` configurations. What it throws ends the plan, and reaches
-  /// who asked for it.
+  /// Values, and gradients where `gradient` is not null, at `count` configurations. What it throws ends the plan, and
+  /// reaches who asked for it.
   /// \param q (count, n) in C order, finite
   /// \param value out: (count,), finite   \param gradient out: (count, n), finite, or null
   virtual void evaluate(std::size_t count, const double* q, double* value, double* gradient) const = 0;

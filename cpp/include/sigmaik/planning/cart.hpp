@@ -3,9 +3,9 @@
 /// Where to drive the cart of a cart-mounted arm so that the arm stays clear of its shoulder singularity
 /// (Salvato et al. 2022), exactly.
 ///
-/// Frame: x along the cart, z along the first joint's axis, which stands at (x_C, 0). A point P = (x_P, y_P) of the arm,
-/// whose path is given in M samples evenly spaced in time, must stay out of the circle of radius r about it. So sample i
-/// forbids
+/// Frame: x along the cart, z along the first joint's axis, which stands at (x_C, 0). A point P = (x_P, y_P) of the
+/// arm, whose path is given in M samples evenly spaced in time, must stay out of the circle of radius r about it. So
+/// sample i forbids
 ///
 ///     λ∓_i = x_P ∓ √(r² − y_P²),   λ−_i < x_C < λ+_i,   where |y_P| < r                                        (6)
 ///
@@ -13,10 +13,10 @@
 /// functional (10) where its density H is a constraint.
 ///
 /// Once it is known on which side of each connected part of the region the cart passes, x_i lies in a tube lo_i ≤ x_i ≤
-/// up_i, and the answer is the taut string in it. That is the optimum: the objective is strictly convex, the constraints
-/// linear, and with μ_i = 2x_i − x_{i−1} − x_{i+1} the string satisfies the conditions of Karush, Kuhn and Tucker, μ_i > 0
-/// only where x_i = lo_i, μ_i < 0 only where x_i = up_i. It minimises every convex function of the increments, so it has
-/// the least top speed too.
+/// up_i, and the answer is the taut string in it. That is the optimum: the objective is strictly convex, the
+/// constraints linear, and with μ_i = 2x_i − x_{i−1} − x_{i+1} the string satisfies the conditions of Karush, Kuhn and
+/// Tucker, μ_i > 0 only where x_i = lo_i, μ_i < 0 only where x_i = up_i. It minimises every convex function of the
+/// increments, so it has the least top speed too.
 
 #include <cstdint>
 #include <limits>
@@ -67,14 +67,14 @@ class CartError : public Error {
 struct CartOptions {
   double lower = -std::numeric_limits<double>::infinity();  ///< [m] of the cart's range
   double upper = std::numeric_limits<double>::infinity();   ///< [m] of the cart's range
-  double margin = 0.0;  ///< [m] ≥ 0, added to the radius
+  double margin = 0.0;                                      ///< [m] ≥ 0, added to the radius
   /// [rad] by which the azimuth of P seen from the axis turns between the ends, positive about z. Ways that turn by it
   /// to half a turn are taken; none: all are.
   std::optional<double> turn = std::nullopt;
-  double duration = 1.0;  ///< [s] between the first and the last sample
+  double duration = 1.0;                                              ///< [s] between the first and the last sample
   double max_speed = std::numeric_limits<double>::infinity();         ///< [m/s] > 0
   double max_acceleration = std::numeric_limits<double>::infinity();  ///< [m/s²] > 0, second differences of the samples
-  bool at_rest = false;  ///< the cart starts and stops within max_acceleration, where that is finite
+  bool at_rest = false;     ///< the cart starts and stops within max_acceleration, where that is finite
   int max_strings = 20000;  ///< ≥ 1, taut strings drawn to find the best sides
 };
 
@@ -116,27 +116,28 @@ void taut_string(const VectorRef& at, const VectorRef& lower, const VectorRef& u
 /// with `turn`, the range and the speed is found by branch and bound: leaving a part of the region out can only lower
 /// energy and top speed.
 ///
-/// Where the string accelerates more than it may, or `at_rest` holds, a quadratic program with bounds on second differences
-/// takes its place, on the same sides: the law of the least energy that keeps all limits, to about 1e-9 of them, by an
-/// interior-point method in O(M) an iteration. It bends everywhere, so that μ does not tell where it touches.
+/// Where the string accelerates more than it may, or `at_rest` holds, a quadratic program with bounds on second
+/// differences takes its place, on the same sides: the law of the least energy that keeps all limits, to about 1e-9 of
+/// them, by an interior-point method in O(M) an iteration. It bends everywhere, so that μ does not tell where it
+/// touches.
 /// \throws CartError with the reason where there is none
 /// \throws Error where an argument is out of its range
 CartLaw cart_law(const PlanarPath& path, double start, double end, double radius, const CartOptions& options = {});
 
 /// Settings of the gradient descent.
 struct CartDescent {
-  double alpha = 0.01;         ///< [1/mm²] > 0, weight of smoothness in (10), between samples
-  double step = 20.0;          ///< [mm²] > 0, η; stable below 1/(4 alpha)
-  int max_iterations = 53707;  ///< ≥ 1
+  double alpha = 0.01;           ///< [1/mm²] > 0, weight of smoothness in (10), between samples
+  double step = 20.0;            ///< [mm²] > 0, η; stable below 1/(4 alpha)
+  int max_iterations = 53707;    ///< ≥ 1
   bool until_admissible = true;  ///< stop at the first law that is admissible, to `depth`
   /// [mm] ≥ 0. Kicks out of the region and creep into it keep a law at the border hopping: where no sample is deeper
   /// inside than this, those inside are put on the border at the end.
   double depth = 1e-3;
 };
 
-/// Gradient descent on the paper's functional F = ΣH(x_i) + α Σ(x_{i+1} − x_i)² (10), H = max(0, 1 − |x − x_P|/h) with h
-/// half the forbidden interval, lengths in mm as there. Works on x (M,) [m], whose ends stay. H has a kink on the centre
-/// line, where its slope counts as zero.
+/// Gradient descent on the paper's functional F = ΣH(x_i) + α Σ(x_{i+1} − x_i)² (10), H = max(0, 1 − |x − x_P|/h) with
+/// h half the forbidden interval, lengths in mm as there. Works on x (M,) [m], whose ends stay. H has a kink on the
+/// centre line, where its slope counts as zero.
 /// \returns iterations done
 /// \throws Error where an argument is out of its range
 int cart_descent(const VectorRef& lower, const VectorRef& upper, VectorXd& x, const CartDescent& options = {});

@@ -1,15 +1,15 @@
 #pragma once
 /// \file cart_plane.hpp
-/// Where to drive a cart with two linear axes, so that a point of the arm on it stays clear of the first joint's axis: the case
-/// that Salvato et al. (2022) leave open.
+/// Where to drive a cart with two linear axes, so that a point of the arm on it stays clear of the first joint's axis:
+/// the case that Salvato et al. (2022) leave open.
 ///
 /// The cart is at c_i, the point at f_i, both in the plane, in M samples evenly spaced in time. Wanted is the least
-/// Σ_i |c_{i+1} − c_i|² between given ends with |c_i − f_i| ≥ r. Seen from the point the obstacle is a disc at rest, and
-/// d = c − f goes round it one way or the other: what is combinatorial is how often d winds about the disc.
+/// Σ_i |c_{i+1} − c_i|² between given ends with |c_i − f_i| ≥ r. Seen from the point the obstacle is a disc at rest,
+/// and d = c − f goes round it one way or the other: what is combinatorial is how often d winds about the disc.
 ///
-/// Where f moves on a straight line at constant speed, Σ|Δc|² is Σ|Δd|² but for a constant, and the plane outside a disc, with
-/// its turns counted, has one shortest way between two points: tangent, arc, tangent. Other paths f pull d with −f̈, and may
-/// have several local minima of the same winding; the best of a bounded number of starts is returned.
+/// Where f moves on a straight line at constant speed, Σ|Δc|² is Σ|Δd|² but for a constant, and the plane outside a
+/// disc, with its turns counted, has one shortest way between two points: tangent, arc, tangent. Other paths f pull d
+/// with −f̈, and may have several local minima of the same winding; the best of a bounded number of starts is returned.
 
 #include <array>
 #include <limits>
@@ -24,9 +24,11 @@ namespace sigmaik::planning {
 /// What a motion in the plane must keep to.
 struct PlaneCartOptions {
   Eigen::Vector2d lower = Eigen::Vector2d::Constant(-std::numeric_limits<double>::infinity());  ///< [m] of each axis
-  Eigen::Vector2d upper = Eigen::Vector2d::Constant(std::numeric_limits<double>::infinity());   ///< [m]; equal: it stands
-  double margin = 0.0;  ///< [m] ≥ 0, added to the radius
-  double max_radius = std::numeric_limits<double>::infinity();  ///< [m] > radius + margin, the farthest that the point may be
+  Eigen::Vector2d upper = Eigen::Vector2d::Constant(
+      std::numeric_limits<double>::infinity());  ///< [m]; equal: it stands
+  double margin = 0.0;                           ///< [m] ≥ 0, added to the radius
+  double max_radius =
+      std::numeric_limits<double>::infinity();  ///< [m] > radius + margin, the farthest that the point may be
   /// [rad] by which the point's azimuth turns seen from the axis, positive about z, to within half a turn; none: any.
   std::optional<double> turn = std::nullopt;
   double duration = 1.0;  ///< [s] between the first and the last sample
@@ -38,8 +40,8 @@ struct PlaneCartOptions {
 
 /// A motion of the cart.
 struct PlaneCartLaw {
-  PlanarPath c;     ///< (M, 2) [m]
-  VectorXd push;    ///< (M,) [m] ≥ 0: (2c_i − c_{i−1} − c_{i+1}) along c_i − f_i, where it touches the disc, else 0
+  PlanarPath c;         ///< (M, 2) [m]
+  VectorXd push;        ///< (M,) [m] ≥ 0: (2c_i − c_{i−1} − c_{i+1}) along c_i − f_i, where it touches the disc, else 0
   double energy = 0.0;  ///< [m²] Σ |Δc|²
   double turn = 0.0;    ///< [rad] of the point's azimuth
   int starts = 0;       ///< first guesses tried
@@ -48,14 +50,15 @@ struct PlaneCartLaw {
 
 /// The motion of the least energy from start to end [m] along `path` (M ≥ 3), outside the disc of `radius` [m] > 0.
 ///
-/// Starts: the straight motion, taken round the disc on either side wherever it runs into it, and tangent, arc, tangent; with as
-/// many turns as asked for, or any. Each is improved on a coarse grid of times: |d_i| ≥ r is replaced by d_i·n_i ≥ r with
-/// n_i = d_i/|d_i|, a quadratic program whose answer keeps out of the disc, and costs no more than the guess did; and again from
-/// there. Where that stops the conditions of Karush, Kuhn and Tucker of the problem itself hold. The best is refined on all
-/// samples. Limits of speed and acceleration are held on the way that is the best without them.
+/// Starts: the straight motion, taken round the disc on either side wherever it runs into it, and tangent, arc,
+/// tangent; with as many turns as asked for, or any. Each is improved on a coarse grid of times: |d_i| ≥ r is replaced
+/// by d_i·n_i ≥ r with n_i = d_i/|d_i|, a quadratic program whose answer keeps out of the disc, and costs no more than
+/// the guess did; and again from there. Where that stops the conditions of Karush, Kuhn and Tucker of the problem
+/// itself hold. The best is refined on all samples. Limits of speed and acceleration are held on the way that is the
+/// best without them.
 /// \throws CartError with the reason where none was found
 /// \throws Error where an argument is out of its range
-PlaneCartLaw plane_cart_law(const PlanarPath& path, const Eigen::Vector2d& start, const Eigen::Vector2d& end, double radius,
-                            const PlaneCartOptions& options = {});
+PlaneCartLaw plane_cart_law(const PlanarPath& path, const Eigen::Vector2d& start, const Eigen::Vector2d& end,
+                            double radius, const PlaneCartOptions& options = {});
 
 }  // namespace sigmaik::planning

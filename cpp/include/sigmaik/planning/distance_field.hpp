@@ -10,11 +10,11 @@
 
 namespace sigmaik::planning {
 
-/// Signed distance to the nearest surface [m]: positive in free space, negative inside obstacles. A value: cheap to copy
-/// (copies share one immutable grid), safe to use from many threads.
+/// Signed distance to the nearest surface [m]: positive in free space, negative inside obstacles. A value: cheap to
+/// copy (copies share one immutable grid), safe to use from many threads.
 ///
-/// Inside the grid the nodes' distances are interpolated trilinearly: continuous, with a gradient that jumps at the cells'
-/// faces. As distances change by no more than 1 m per metre, an interpolated one is wrong by at most √3/2 cells.
+/// Inside the grid the nodes' distances are interpolated trilinearly: continuous, with a gradient that jumps at the
+/// cells' faces. As distances change by no more than 1 m per metre, an interpolated one is wrong by at most √3/2 cells.
 ///
 /// Outside it is a bound from below of the distance to whatever lies within the grid: with p̄ the nearest point of the
 /// grid's box, and D the distance there, |p − o|² ≥ |p − p̄|² + |p̄ − o|² for every point o of a convex box, so that

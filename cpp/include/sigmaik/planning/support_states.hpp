@@ -1,12 +1,12 @@
 #pragma once
 /// \file support_states.hpp
-/// Motions as support states under a Gaussian-process prior, moved so that a cost of their states falls (Petrović et al.):
-/// by its gradient, or by samples.
+/// Motions as support states under a Gaussian-process prior, moved so that a cost of their states falls (Petrović et
+/// al.): by its gradient, or by samples.
 ///
-/// N + 1 states, evenly in unit time, the first and last fixed. The prior is that of white noise on acceleration (a constant
-/// velocity model, eqs. 7 to 9) for every joint, conditioned on both end positions, about the straight line μ: its covariance,
-/// scaled to a largest variance of 1, is K̄ ∝ k(s, u) = s(1 − u)(2u − s² − u²)/6 for s ≤ u. Between the states the prior's mean
-/// is the natural cubic spline through them.
+/// N + 1 states, evenly in unit time, the first and last fixed. The prior is that of white noise on acceleration (a
+/// constant velocity model, eqs. 7 to 9) for every joint, conditioned on both end positions, about the straight line μ:
+/// its covariance, scaled to a largest variance of 1, is K̄ ∝ k(s, u) = s(1 − u)(2u − s² − u²)/6 for s ≤ u. Between the
+/// states the prior's mean is the natural cubic spline through them.
 
 #include <cstdint>
 #include <memory>
@@ -28,10 +28,10 @@ struct SupportStates {
 };
 
 struct GradientOptions {
-  int states = 21;            ///< N + 1, 3 to 1000
-  double prior_weight = 10.0; ///< > 0: what ‖q − μ‖² in K̄⁻¹ weighs against the cost
-  int max_iterations = 100;   ///< ≥ 1
-  double tolerance = 1e-4;    ///< ≥ 0: stops where an iteration gains less than this part of the objective
+  int states = 21;             ///< N + 1, 3 to 1000
+  double prior_weight = 10.0;  ///< > 0: what ‖q − μ‖² in K̄⁻¹ weighs against the cost
+  int max_iterations = 100;    ///< ≥ 1
+  double tolerance = 1e-4;     ///< ≥ 0: stops where an iteration gains less than this part of the objective
 };
 
 struct StochasticOptions {
@@ -55,19 +55,19 @@ class SupportPlanner {
   SupportPlanner(SupportPlanner&&) noexcept;
   SupportPlanner& operator=(SupportPlanner&&) noexcept;
 
-  /// Minimises Σ cost(q_i) + w ‖q − μ‖² in K̄⁻¹ by L-BFGS in x, q = μ + C x, K̄ = C Cᵀ, from `guess` (states, n), or from the
-  /// straight line where that is empty. States are kept within the limits by projection.
+  /// Minimises Σ cost(q_i) + w ‖q − μ‖² in K̄⁻¹ by L-BFGS in x, q = μ + C x, K̄ = C Cᵀ, from `guess` (states, n), or from
+  /// the straight line where that is empty. States are kept within the limits by projection.
   /// \throws Error where an option is out of its range, or an end outside the limits; what the cost throws
   SupportStates gradient(const JointVector& start, const JointVector& goal, const GradientOptions& options,
                          const std::vector<double>& guess = {});
 
-  /// Moves the states by the mean of samples about them, weighted by their cost (14) to (16), and returns the best that was
-  /// met. The same for the same seed.
+  /// Moves the states by the mean of samples about them, weighted by their cost (14) to (16), and returns the best that
+  /// was met. The same for the same seed.
   /// \throws Error as gradient()
   SupportStates stochastic(const JointVector& start, const JointVector& goal, const StochasticOptions& options);
 
-  /// A motion drawn from the prior about the straight line, of standard deviation `deviation` [rad or m] ≥ 0 half-way, its
-  /// states projected on the limits: a first guess. The same for the same seed.
+  /// A motion drawn from the prior about the straight line, of standard deviation `deviation` [rad or m] ≥ 0 half-way,
+  /// its states projected on the limits: a first guess. The same for the same seed.
   /// \throws Error as gradient()
   SupportStates draw(const JointVector& start, const JointVector& goal, double deviation, std::uint64_t seed);
 

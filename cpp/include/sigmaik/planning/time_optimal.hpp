@@ -10,12 +10,13 @@
 ///     (q_0, q̇_0) and (q_{N−1}, q̇_{N−1}) given,   lower ≤ q_k ≤ upper,   |q̇_k| ≤ velocity,   |q̈_k| ≤ acceleration
 ///
 /// As printed in the paper, h is t_F/N where the motion takes N − 1 steps: the last one, of length h, is spent at the
-/// goal. Limits at the nodes are limits between them for velocities, not for positions: where a velocity changes its sign
-/// within a step, q overshoots by up to h²/8 times the acceleration. So, beyond the paper, q_k + h q̇_k/2 is kept within the
-/// position limits too: a step's parabola stays in the hull of its ends and that point.
+/// goal. Limits at the nodes are limits between them for velocities, not for positions: where a velocity changes its
+/// sign within a step, q overshoots by up to h²/8 times the acceleration. So, beyond the paper, q_k + h q̇_k/2 is kept
+/// within the position limits too: a step's parabola stays in the hull of its ends and that point.
 ///
-/// Solved by a primal-dual interior-point method whose every iterate satisfies the dynamics: in p = h q̇ and a = h² q̈ they
-/// do not know h, so that a Newton step is one Riccati recursion with one more column for h. Answers are local minima.
+/// Solved by a primal-dual interior-point method whose every iterate satisfies the dynamics: in p = h q̇ and a = h² q̈
+/// they do not know h, so that a Newton step is one Riccati recursion with one more column for h. Answers are local
+/// minima.
 
 #include <cstdint>
 #include <memory>
