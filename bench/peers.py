@@ -107,7 +107,7 @@ CANDIDATES: dict[str, tuple[Callable[[], Callable[[int], object]], tuple[str, ..
 def measure() -> list[dict[str, object]]:
     cycles = {}
     rows: list[dict[str, object]] = []
-    for name, (build, packages) in CANDIDATES.items():
+    for name, (build, _) in CANDIDATES.items():
         try:
             cycles[name] = build()
         except ImportError as missing:

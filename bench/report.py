@@ -184,10 +184,12 @@ def main() -> int:
                          f"{ours['p50_us']:.2f} µs", row["ratio"], goals[row["name"]]))  # fmt: skip
     if "constrained_eiquadprog" in ns:
         for name, text in (("constrained_sigmaik", "warm"), ("constrained_sigmaik_cold", "cold")):
-            rows.append((f"least_squares, 7 unknowns, 3 eq., box, {text} / eiquadprog, {cpu('constrained_eiquadprog'):.0f} ns",
-                         f"{cpu(name):.0f} ns", cpu("constrained_eiquadprog") / cpu(name), 1.5))  # fmt: skip
+            peer = cpu("constrained_eiquadprog")
+            rows.append((f"least_squares, 7 unknowns, 3 eq., box, {text} / eiquadprog, {peer:.0f} ns",
+                         f"{cpu(name):.0f} ns", peer / cpu(name), 1.5))  # fmt: skip
     rows.append(("ConstrainedIk::step, 2 iterations, optimised / KDL's wdls",
-                 f"{cpu('constrained_ik_step'):.0f} ns", cpu("velocity_kdl_wdls") / cpu("constrained_ik_step"), 0.75))  # fmt: skip
+                 f"{cpu('constrained_ik_step'):.0f} ns",
+                 cpu("velocity_kdl_wdls") / cpu("constrained_ik_step"), 0.75))  # fmt: skip
     one, two = (float(ns[f"batch/65536/{threads}"]["items_per_second"]) for threads in (1, 2))
     for i, arm in enumerate(("Comau", "Panda", "iiwa")):
         potentials = cpu(f"potential_gradient/{i}")

@@ -18,9 +18,9 @@ __all__ = ["add_execute"]
 
 def add_execute(parser: argparse.ArgumentParser) -> None:
     parser.description = (
-        "Plans a time-optimal motion from one random configuration to another, and executes it in MuJoCo: by computed torque, "
-        "which knows of no payload, by one that does, and by the joints' velocity loops. Prints tracking errors and the torques "
-        "used. The last line on stdout is the last file. Needs the extra sim."
+        "Plans a time-optimal motion from one random configuration to another, and executes it in MuJoCo: by computed "
+        "torque, which knows of no payload, by one that does, and by the joints' velocity loops. Prints tracking "
+        "errors and the torques used. The last line on stdout is the last file. Needs the extra sim."
     )
     motion = parser.add_argument_group("the motion")
     add_arm(motion, "franka_panda")

@@ -23,9 +23,9 @@ __all__ = ["add_montecarlo"]
 
 def add_montecarlo(parser: argparse.ArgumentParser) -> None:
     parser.description = (
-        "Time-optimal motions between random pairs of configurations, by three objectives, with the metrics of Beck et al. "
-        "(2022) beside the paper's. Writes a line for each sample as it comes: called again with the same options it goes "
-        "on from where it stopped. The last line on stdout is the last arm's file."
+        "Time-optimal motions between random pairs of configurations, by three objectives, with the metrics of Beck et "
+        "al. (2022) beside the paper's. Writes a line for each sample as it comes: called again with the same options "
+        "it goes on from where it stopped. The last line on stdout is the last arm's file."
     )
     standard = mc.Study()
     parser.add_argument(
@@ -122,8 +122,8 @@ def _run(
         rows = mc.run_study(study, file, executor, lambda n: progress.advance(task, n), jobs)
 
     console.print(
-        f"{study.robot}: {study.samples} pairs, seed {study.seed}, time weight {study.time_weight:g}, {study.nodes} nodes, "
-        f"{study.solver}{', m from the Jacobian' if study.generic else ''}",
+        f"{study.robot}: {study.samples} pairs, seed {study.seed}, time weight {study.time_weight:g}, "
+        f"{study.nodes} nodes, {study.solver}{', m from the Jacobian' if study.generic else ''}",
         highlight=False,
     )
     console.print()

@@ -25,8 +25,8 @@ def add_physics_options(parser: argparse.ArgumentParser) -> None:
         nargs="?",
         const="velocity",
         choices=("velocity", "torque"),
-        help="run every method once more on an arm with mass, in MuJoCo, and compare: joints driven by velocity loops (the "
-        "default), or by computed torque",
+        help="run every method once more on an arm with mass, in MuJoCo, and compare: joints driven by velocity loops "
+        "(the default), or by computed torque",
     )
     group.add_argument(
         "--feedback",
@@ -45,7 +45,8 @@ def add_arm_options(group: argparse._ArgumentGroup) -> None:
         type=float,
         default=0.0,
         metavar="PART",
-        help="dry friction, as a part of the effort limits, and as much again, viscous, at the speed limits (%(default)g)",
+        help="dry friction, as a part of the effort limits, and as much again, viscous, at the speed limits "
+        "(%(default)g)",
     )
     for option, unit, text in (
         ("--payload", "KG", "a point mass at the tip, of which the drives do not know"),

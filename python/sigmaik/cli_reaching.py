@@ -15,9 +15,9 @@ __all__ = ["add_reaching"]
 
 def add_reaching(parser: argparse.ArgumentParser) -> None:
     parser.description = (
-        "Motions between random configurations by several methods, with the indices of Petrović et al. averaged along them, "
-        "beside the paper's table 1, and what they cost in length, acceleration and time. The last line on stdout is the "
-        "path of the table as CSV."
+        "Motions between random configurations by several methods, with the indices of Petrović et al. averaged along "
+        "them, beside the paper's table 1, and what they cost in length, acceleration and time. The last line on "
+        "stdout is the path of the table as CSV."
     )
     parser.epilog = "methods: " + "; ".join(f"{name}: {text}" for name, text in rc.METHODS.items())
     parser.add_argument("--robot", default=",".join(rc.ROBOTS), metavar="LIST", help="shipped arms (%(default)s)")

@@ -16,8 +16,8 @@ __all__ = ["add_table"]
 def add_table(parser: argparse.ArgumentParser) -> None:
     parser.description = (
         "An iiwa from under a table to above it, planned by samples, with the geometry-aware index and without, after "
-        "Petrović et al., section 4.2. Distances are checked at ten times as many points as the planner looks at. The last "
-        "line on stdout is the picture's path."
+        "Petrović et al., section 4.2. Distances are checked at ten times as many points as the planner looks at. The "
+        "last line on stdout is the picture's path."
     )
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of start, goal and samples (%(default)s)")
     parser.add_argument("--out", default="sigmaik-table", type=pathlib.Path, metavar="DIR", help="(%(default)s)")

@@ -39,10 +39,10 @@ _SETTINGS = (
 
 def add_track(parser: argparse.ArgumentParser) -> None:
     parser.description = (
-        "An arm follows a target that moves, as a simulated camera sees it: late, noisy, some pictures without it, some wrong, "
-        "and none at all for a while. Every rule with the first mode, and every mode with the first rule, all limits on. "
-        "Prints tables of errors, delay, jerk and events, and writes time series, the tables and pictures. The last line on "
-        "stdout is the last file."
+        "An arm follows a target that moves, as a simulated camera sees it: late, noisy, some pictures without it, "
+        "some wrong, and none at all for a while. Every rule with the first mode, and every mode with the first rule, "
+        "all limits on. Prints tables of errors, delay, jerk and events, and writes time series, the tables and "
+        "pictures. The last line on stdout is the last file."
     )
     parser.epilog = (
         "targets: " + "; ".join(f"{name}: {text}" for name, text in track.TARGETS.items())
@@ -54,8 +54,8 @@ def add_track(parser: argparse.ArgumentParser) -> None:
     arm.add_argument(
         "--target",
         default="marker",
-        help=f"{', '.join(track.TARGETS)}, or a recording: CSV with columns t, x, y, z, roll, pitch, yaw, or npz with t (M,) "
-        "and pose (M, 4, 4) (%(default)s)",
+        help=f"{', '.join(track.TARGETS)}, or a recording: CSV with columns t, x, y, z, roll, pitch, yaw, or npz with "
+        "t (M,) and pose (M, 4, 4) (%(default)s)",
     )
     arm.add_argument(
         "--method",

@@ -230,14 +230,14 @@ def test_a_general_solver_finds_nothing_better(limited):
             except CartError:
                 continue
             rows = [
-                lambda z: (options["max_speed"] - np.abs(np.diff(whole(z), axis=0))).ravel(),
-                lambda z: (options["max_acceleration"] - np.abs(np.diff(whole(z), 2, axis=0))).ravel(),
+                lambda z, most=options["max_speed"]: (most - np.abs(np.diff(whole(z), axis=0))).ravel(),
+                lambda z, most=options["max_acceleration"]: (most - np.abs(np.diff(whole(z), 2, axis=0))).ravel(),
             ]
 
         def whole(z, start=start, end=end):
             return np.vstack([start, z.reshape(-1, 2), end])
 
-        def apart(z, path=path):
+        def apart(z, path=path, r=r):
             return np.sum((whole(z) - path)[1:-1] ** 2, axis=1) - r * r
 
         for noise in (0.0, 0.02, 0.1):

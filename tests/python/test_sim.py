@@ -393,8 +393,8 @@ def test_reach_command(tmp_path, capsys, waypoints):
     assert len(rows) == 4
     assert all(float(row["max_tip_distance"]) > 0.0 for row in rows)
     options = (
-        "--physics torque --feedback measured --friction 0.01 --payload 0.5 --noise 1e-4 --velocity-noise 1e-3 --delay 1 "
-        "--period 2e-3 --frequency 30 --seed 3 --method all --limits on --format none --no-plot"
+        "--physics torque --feedback measured --friction 0.01 --payload 0.5 --noise 1e-4 --velocity-noise 1e-3 "
+        "--delay 1 --period 2e-3 --frequency 30 --seed 3 --method all --limits on --format none --no-plot"
     )
     assert main(["reach", "--path", waypoints, "--out", str(out), *options.split()]) == 0
     captured = capsys.readouterr().out

@@ -74,14 +74,19 @@ def test_a_twist_moves_only_while_it_is_said(session):
 
 
 def test_refused_commands_leave_all_as_it_is(session):
-    for wrong in (np.eye(3), np.full((4, 4), np.nan), 2.0 * np.eye(4), "here"):
-        with pytest.raises(ValueError):
+    for wrong, why in (
+        (np.eye(3), "4×4 pose"),
+        (np.full((4, 4), np.nan), "finite"),
+        (2.0 * np.eye(4), "not a pose"),
+        ("here", "could not convert"),
+    ):
+        with pytest.raises(ValueError, match=why):
             session.follow(wrong)
     far = np.eye(4)
     far[0, 3] = 1e3
     with pytest.raises(ValueError, match="100 m"):
         session.follow(far)
-    with pytest.raises(ValueError):
+    with pytest.raises(ValueError, match="twist"):
         session.twist([0.0] * 5)
     assert session.goal is None
     assert latest(session)["command"] == sk.LoopCommand.HOLD
@@ -229,7 +234,7 @@ def test_what_is_no_recording_is_refused(tmp_path):
     for name in ("text.npz", "other.npz"):
         with pytest.raises(ValueError, match="not a recording"):
             Episode.load(tmp_path / name)
-    with pytest.raises(OSError):
+    with pytest.raises(FileNotFoundError):
         Episode.load(tmp_path / "none.npz")
 
 

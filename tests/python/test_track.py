@@ -45,7 +45,8 @@ def test_stream_predicts_and_holds():
         target = stream.at(1e-3 * k)
     assert target.status == sk.StreamStatus.STALE
     np.testing.assert_allclose(target.twist, 0.0, atol=1e-9)
-    assert "outliers=1" in repr(stream.counts) and "stale" in repr(target)
+    assert "outliers=1" in repr(stream.counts)
+    assert "stale" in repr(target)
 
 
 def test_stream_starts_from_where_the_arm_is():
@@ -105,7 +106,9 @@ def test_targets_start_and_end_at_home_and_at_rest():
         home = e.chain.pose(sk.robots.home("ur10"))
         np.testing.assert_allclose(e.poses[[0, -1]], [home, home], atol=2e-3)
         speed = np.linalg.norm(e.twists[:, :3], axis=1)
-        assert speed[0] < 0.01 and speed[-1] < 0.01 and speed.max() > 0.1
+        assert speed[0] < 0.01
+        assert speed[-1] < 0.01
+        assert speed.max() > 0.1
         assert e.reachable.all() == (target not in ("marker", "out-and-back")), target
         # The twists take each pose to the next, and jump nowhere.
         assert np.abs(np.diff(e.twists[:, :3], axis=0)).max() * 200.0 < 10.0
@@ -160,7 +163,8 @@ def test_outliers_and_stops(experiment):
         assert row.moved_by_outliers < 1e-9
         assert row.drift < 5e-3
         stale = experiment.t[followed.stale]
-        assert stale.min() > experiment.gap[0] and stale.max() < experiment.gap[1] + 0.2
+        assert stale.min() > experiment.gap[0]
+        assert stale.max() < experiment.gap[1] + 0.2
     raw = track.summarize_track(run(experiment, "raw", False), run(experiment, "raw", False, outliers=False))
     assert raw.moved_by_outliers > 5e-3
 

@@ -108,16 +108,25 @@ def solve_task(
     """Plans, and measures."""
     begin = time.perf_counter()
     if method == "straight":
-        sample: Callable[[Array], Array] = lambda s: start + s[:, None] * (goal - start)
         solve_time = 0.0
+
+        def sample(s: Array) -> Array:
+            return start + s[:, None] * (goal - start)
+
     elif method == "task-priority":
         path = _task_priority(chain, start, goal)
         solve_time = time.perf_counter() - begin
-        sample = lambda s: np.stack([np.interp(s, np.linspace(0, 1, len(path)), x) for x in path.T], axis=1)
+
+        def sample(s: Array) -> Array:
+            return np.stack([np.interp(s, np.linspace(0, 1, len(path)), x) for x in path.T], axis=1)
+
     else:
         plan = _PLANNERS[method](chain, start, goal, seed, planning)
         solve_time = plan.solve_time
-        sample = lambda s: plan.sample(s)[0]
+
+        def sample(s: Array) -> Array:
+            return plan.sample(s)[0]
+
     q = sample(np.linspace(0.0, 1.0, POINTS))
     eigenvalues = np.linalg.svd(chain.jacobian(q), compute_uv=False) ** 2
     fine = sample(np.linspace(0.0, 1.0, 2001))

@@ -87,7 +87,7 @@ class Camera:
     dropout: float = 0.1  #: share of the pictures without a marker
     delay: float = 0.05  #: [s] from the picture to the sample
     outliers: float = 0.03  #: share of the samples that are elsewhere, or turned over
-    #: [m] from the marker to the target, along the marker's z; it turns noise of the orientation into such of the place.
+    #: [m] from the marker to the target, along the marker's z: noise of the orientation becomes noise of the position.
     offset: float = 0.15
     gap: tuple[float, float] | None = (0.8, 1.5)  #: from this part of the time the stream stops for so long [s]
 

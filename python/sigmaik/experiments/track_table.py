@@ -9,12 +9,12 @@ from typing import Literal
 from rich.table import Table
 from rich.text import Text
 
+from .table import titled_table
 from .track import TrackExperiment, TrackSummary
 
-By = Literal["method", "mode"]
-from .table import titled_table
-
 __all__ = ["error_table", "event_table", "headline", "motion_table"]
+
+By = Literal["method", "mode"]
 
 
 def headline(e: TrackExperiment) -> str:
@@ -22,9 +22,11 @@ def headline(e: TrackExperiment) -> str:
     away = 1.0 - float(e.reachable.mean())
     gap = f", none for {e.gap[1] - e.gap[0]:g} s" if e.gap[1] > e.gap[0] else ""
     return (
-        f"{e.robot}, {e.target}: {len(e.poses) / s.rate:g} s at {s.rate:g} Hz, {100 * away:.0f} % of it out of reach, seed {s.seed}\n"
-        f"camera: {c.rate:g} Hz, {1e3 * c.delay:g} ms late, noise {1e3 * c.noise:g} mm and {1e3 * c.rotation_noise:g} mrad at "
-        f"{1e3 * c.offset:g} mm,\n{100 * c.dropout:g} % missing, {100 * c.outliers:g} % wrong{gap}; fed: the target's twist is fed forward"
+        f"{e.robot}, {e.target}: {len(e.poses) / s.rate:g} s at {s.rate:g} Hz, {100 * away:.0f} % of it out of reach, "
+        f"seed {s.seed}\n"
+        f"camera: {c.rate:g} Hz, {1e3 * c.delay:g} ms late, noise {1e3 * c.noise:g} mm and "
+        f"{1e3 * c.rotation_noise:g} mrad at {1e3 * c.offset:g} mm,\n"
+        f"{100 * c.dropout:g} % missing, {100 * c.outliers:g} % wrong{gap}; fed: the target's twist is fed forward"
     )
 
 

@@ -243,8 +243,9 @@ def cart_trajectory(
         joints, reached = follow(chain, _shifted(path, motion, warp, to_base, to_tip), time, rows[-1][-1, 1:])
         if reached < len(time):
             raise ValueError(
-                f"the arm cannot follow motion {k}: at t = {time[reached] * spans[k]:g} s of {spans[k]:g} s it finds no joints "
-                f"near {joints[-1].tolist()}, where the smallest singular value is {_least(chain, joints[-1:])[0]:g}"
+                f"the arm cannot follow motion {k}: at t = {time[reached] * spans[k]:g} s of {spans[k]:g} s it finds "
+                f"no joints near {joints[-1].tolist()}, where the smallest singular value is "
+                f"{_least(chain, joints[-1:])[0]:g}"
             )
         missed = float(np.max(np.abs(joints[-1] - after[1:])))
         if missed > joint_tolerance:

@@ -332,7 +332,8 @@ class _Spline:
 
 def _within(chain: Chain, q: Array) -> _Spline:
     """The spline through the states, or, where it overshoots a limit of position, through states as much nearer to the
-    straight line as it takes: that is within, and what the spline overshoots by is convex in how far they are from it."""
+    straight line as necessary. The line itself is within the limits, and the overshoot is convex in the distance of the
+    states from the line."""
     line = q[0] + np.linspace(0.0, 1.0, len(q))[:, None] * (q[-1] - q[0])
 
     def keeps(part: float) -> bool:

@@ -93,7 +93,8 @@ def joint_bars(q: Array, qdot: Array, chain: sk.Chain, limiting: int) -> str:
             f"{_marker(at, colour)}<span style='width:4.5em;text-align:right'>{float(q[i]):+.2f}</span>"
             f"{_bar(speed, _RED if speed > 0.999 else _GREEN)}</div>"
         )
-    return f"<div id='sk-joints' style='{_FONT}'><div>joints: in their range, and speed of its limit</div>{''.join(rows)}</div>"
+    title = "joints: in their range, and speed of its limit"
+    return f"<div id='sk-joints' style='{_FONT}'><div>{title}</div>{''.join(rows)}</div>"
 
 
 def _bar(part: float, colour: str, tick: float | None = None) -> str:

@@ -207,7 +207,8 @@ class Page:
             posture = gui.add_checkbox(
                 "posture at singularities",
                 settings.singular_posture,
-                hint="J-PARSE: an arm that was stretched out folds back to the side of its posture; off is as published",
+                hint="J-PARSE: an arm that was stretched out folds back to the side of its posture; "
+                "off is as published",
             )
             self._bind(posture, "singular_posture", bool)
 
