@@ -17,11 +17,12 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 import sigmaik as sk
 
 from . import experiments as ex
+from ._extras import need
+from ._types import Array
 from .cli_cart import add_cart
 from .cli_execute import add_execute
 from .cli_montecarlo import add_montecarlo
@@ -30,16 +31,13 @@ from .cli_reaching import add_reaching
 from .cli_table import add_table
 from .cli_teleop import add_teleop
 from .cli_track import add_track
-from .console import MissingPackage, add_arm, add_links, need, terminal
+from .console import add_arm, add_links, terminal
 from .experiments import axis5
-from .experiments.reach import load_arm
 
 if TYPE_CHECKING:
     from rich.console import Console
 
 __all__ = ["main"]
-
-Array = NDArray[np.float64]
 AnyRun = TypeVar("AnyRun")
 
 
@@ -50,7 +48,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         result: int = arguments.run(arguments)
         sys.stdout.flush()
         return result
-    except (ValueError, OSError, MissingPackage) as error:
+    except (ValueError, OSError) as error:
         if isinstance(error, BrokenPipeError):  # `sigmaik robots | head -1`
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             return 0
@@ -179,7 +177,7 @@ def _reach(arguments: argparse.Namespace) -> int:
     for name in ("start", "posture"):
         text = getattr(arguments, name)
         if text is not None:
-            _, chain, home = load_arm(arguments.robot, arguments.base, arguments.tip)
+            _, chain, home, _ = sk.robots.open(arguments.robot, arguments.base, arguments.tip)
             changes[name] = tuple(_configuration(f"--{name}", text, chain, home))
     experiment = ex.load(arguments.robot, arguments.path, base=arguments.base, tip=arguments.tip, **changes)
     methods = _methods(arguments, experiment.settings)
@@ -490,11 +488,10 @@ def _info(arguments: argparse.Namespace) -> int:
     from rich import box
     from rich.table import Table
 
-    name, chain, home = load_arm(arguments.robot, arguments.base, arguments.tip)
+    name, chain, home, source = sk.robots.open(arguments.robot, arguments.base, arguments.tip)
     q = _configuration("--q", arguments.q, chain, home)
     if arguments.samples < 1 or arguments.seed < 0:
         raise ValueError("--samples must be positive, and --seed not negative")
-    source = sk.robots.path(name) if arguments.robot in sk.robots.names() else pathlib.Path(arguments.robot)
     text = source.read_text(encoding="utf-8")
 
     console.print(f"{name}: {chain.dof} joints from '{chain.base}' to '{chain.tip}'", highlight=False)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 import pathlib
 
-from .console import need, terminal
+from ._extras import need
+from .console import terminal
 from .experiments import cart
 from .planning.cart import PUBLISHED_ITERATIONS
 

@@ -9,9 +9,9 @@ import numpy as np
 
 import sigmaik as sk
 
+from ._extras import need
 from .cli_physics import add_arm_options, physics_settings
-from .console import add_arm, need, terminal
-from .experiments.reach import load_arm
+from .console import add_arm, terminal
 
 __all__ = ["add_execute"]
 
@@ -41,7 +41,7 @@ def add_execute(parser: argparse.ArgumentParser) -> None:
 
 def _execute(arguments: argparse.Namespace) -> int:
     console = terminal()
-    need("mujoco", "sim")
+    need("mujoco")
     if not arguments.no_plot:
         need("matplotlib")
     if not 0.0 < arguments.pace < float("inf"):
@@ -51,7 +51,7 @@ def _execute(arguments: argparse.Namespace) -> int:
     from .experiments import execute
     from .experiments.execute_table import execute_table
 
-    robot, chain, _ = load_arm(arguments.robot, arguments.base, arguments.tip)
+    robot, chain, _, _ = sk.robots.open(arguments.robot, arguments.base, arguments.tip)
     if arguments.plan is not None:
         plan = sk.planning.Trajectory.load(arguments.plan)
     else:

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 
 import sigmaik as sk
 
-from .console import need, terminal
+from ._extras import need
+from .console import terminal
 from .experiments import montecarlo as mc
 
 if TYPE_CHECKING:
@@ -73,7 +74,7 @@ def _montecarlo(arguments: argparse.Namespace) -> int:
     if not arguments.no_plot:
         need("matplotlib")
     if arguments.solver == "ipopt":
-        need("casadi", "plan")
+        need("casadi")
     if arguments.jobs < 1:
         raise ValueError("--jobs must be at least 1")
     robots = sk.singularities.names() if arguments.robot == "all" else tuple(arguments.robot.split(","))
@@ -139,7 +140,7 @@ def _run(
 @contextlib.contextmanager
 def _executor(arguments: argparse.Namespace) -> Iterator[tuple[concurrent.futures.Executor | None, int]]:
     if arguments.dask is not None:
-        need("distributed", "cluster")
+        need("distributed")
         from distributed import Client
 
         with Client(arguments.dask, timeout="10s") as client:  # type: ignore[no-untyped-call]

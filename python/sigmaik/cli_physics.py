@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Literal
 
 from . import experiments as ex
-from .console import need
+from ._extras import need
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -103,7 +103,7 @@ def reach_in_physics(
 ) -> int:
     """What `sigmaik reach --physics` does once its options are read. run_all: calls for every method and speed
     limits."""
-    need("mujoco", "sim")
+    need("mujoco")
     from .experiments import physics
     from .experiments.physics_table import physics_table
 

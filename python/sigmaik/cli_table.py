@@ -7,7 +7,8 @@ import pathlib
 
 import numpy as np
 
-from .console import need, terminal
+from ._extras import need
+from .console import terminal
 from .experiments import around_table as at
 
 __all__ = ["add_table"]

@@ -7,7 +7,8 @@ import pathlib
 import webbrowser
 from typing import TYPE_CHECKING
 
-from .console import add_arm, need, terminal
+from ._extras import need
+from .console import add_arm, terminal
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -71,7 +72,7 @@ def _teleop(arguments: argparse.Namespace) -> int:
     console = terminal()
     if arguments.drill:
         return _drill(console)
-    need("viser", "viewer")
+    need("viser", "yourdfpy")
     from .teleop import Episode, Session, Settings
     from .teleop.page import Page
 

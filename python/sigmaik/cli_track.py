@@ -6,7 +6,8 @@ import argparse
 import dataclasses
 import pathlib
 
-from .console import add_arm, need, terminal
+from ._extras import need
+from .console import add_arm, terminal
 from .experiments import track
 from .experiments.methods import SHORT_NAMES, parse_methods
 from .experiments.settings import Settings

@@ -1,19 +1,16 @@
-"""What the commands share: the arm's options, the terminal, and extras that may be missing."""
+"""What the commands share: the arm's options and the terminal."""
 
 from __future__ import annotations
 
 import argparse
-import importlib.util
 from typing import TYPE_CHECKING
+
+from ._extras import need
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-__all__ = ["MissingPackage", "add_arm", "add_links", "need", "terminal"]
-
-
-class MissingPackage(Exception):
-    """A package of an extra is not installed."""
+__all__ = ["add_arm", "add_links", "terminal"]
 
 
 def add_arm(parser: argparse._ActionsContainer, robot: str = "ufactory_xarm7") -> None:
@@ -33,9 +30,3 @@ def terminal() -> Console:
     from rich.console import Console
 
     return Console(soft_wrap=False)
-
-
-def need(package: str, extra: str = "demo") -> None:
-    """Raises with the name of the extra where a package is not installed."""
-    if importlib.util.find_spec(package) is None:
-        raise MissingPackage(f"{package} is not installed; pip install 'sigmaik[{extra}]' brings it")

@@ -14,11 +14,11 @@ from __future__ import annotations
 
 from typing import Literal
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from . import _core
 from ._core import Chain, reference_scale
+from ._types import Array
 
 __all__ = [
     "DEFAULT_SCALE",
@@ -31,8 +31,6 @@ __all__ = [
     "min_singular_value",
     "reference_scale",
 ]
-
-Array = NDArray[np.float64]
 Index = Literal["manipulability", "condition_number", "min_singular_value", "geometry_aware"]
 
 DEFAULT_SCALE: float = _core.DEFAULT_SCALE

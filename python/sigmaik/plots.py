@@ -1,37 +1,29 @@
-"""Figures of experiments, in the style of the J-PARSE paper's, and of planned motions. Needs matplotlib, of the extra
-"plot".
+"""Figures of experiments, in the style of the J-PARSE paper's. Needs matplotlib.
 
 Nothing here needs a display, and pyplot's global state is left alone.
 """
 
 from __future__ import annotations
 
-import io
-import pathlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
-from PIL import Image
 
-from . import indices
-from .files import write_atomically
+from ._plotting import DASHES, JOINT_COLOURS, limit_lines, save_figure
+from ._types import Array
 
 if TYPE_CHECKING:
-    from ._core import Chain
     from .experiments.limits import Trace
     from .experiments.methods import NamedMethod
     from .experiments.reach import Run
-    from .planning import Trajectory
 
-__all__ = ["experiment_figure", "limits_figure", "method_colour", "save_figure", "trajectory_figure"]
-
-Array = NDArray[np.float64]
+__all__ = ["experiment_figure", "limits_figure", "method_colour", "save_figure"]
 
 # Okabe and Ito's colours, which most colour-blind people can tell apart. J-PARSE is the strong blue
 # everywhere.
@@ -45,7 +37,6 @@ _COLOURS = {
     "safety": "#56B4E9",
     "safety-projection": "#7A5C3E",
 }
-_DASHES = ("-", (0, (5, 1.5)), (0, (2, 1)), (0, (6, 1, 1, 1)), (0, (1, 1)), (0, (8, 2)))
 _SWEEP = ("#9CC9E8", "#5BA7D6", "#2E86C1", "#1B5E9E", "#123A6B", "#081D40")
 
 
@@ -134,10 +125,6 @@ def experiment_figure(runs: Sequence[Run], title: str | None = None) -> Figure:
     return figure
 
 
-# Joints, base to tip.
-_JOINTS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7A5C3E", "#4D4D4D", "#7FBF3F")
-
-
 def limits_figure(traces: Sequence[Trace], seconds: tuple[float, float] | None = None) -> Figure:
     """Joint positions, speeds and accelerations as parts of their limits, and the tool's path, per variant.
 
@@ -186,11 +173,11 @@ def limits_figure(traces: Sequence[Trace], seconds: tuple[float, float] | None =
                 axes.plot(
                     t,
                     values[:, joint],
-                    color=_JOINTS[joint % len(_JOINTS)],
+                    color=JOINT_COLOURS[joint % len(JOINT_COLOURS)],
                     linewidth=0.9,
                     label=chain.joint_names[joint],
                 )
-            _limit_lines(axes, top, label if column == 0 else None)
+            limit_lines(axes, top, label if column == 0 else None)
             for phase in trial.phases[1:]:
                 axes.axvline(phase.begin / trace.experiment.settings.rate, color="0.7", linewidth=0.8, zorder=0.5)
             if not known.any():
@@ -224,127 +211,6 @@ def limits_figure(traces: Sequence[Trace], seconds: tuple[float, float] | None =
     return figure
 
 
-def _limit_lines(axes: Axes, top: float, label: str | None) -> None:
-    for sign in (-1.0, 1.0):
-        axes.axhline(sign, color="0.25", linewidth=0.9, linestyle=(0, (4, 3)))
-        axes.axhspan(sign, sign * top, color="0.93", zorder=0)
-    axes.set_ylim(-top, top)
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.tick_params(labelsize=8, labelleft=label is not None)
-    if label is not None:
-        axes.set_ylabel(label)
-
-
-_STEP_SAMPLES = 10  # drawn between two samples of a trajectory
-
-
-def trajectory_figure(trajectory: Trajectory, chain: Chain | None = None) -> Figure:
-    """Positions, speeds and accelerations of all joints over time, between the trajectory's samples too, a line per
-    joint.
-
-    With a chain they are parts of its limits, ±1, the middle of a position's range being 0; a joint without the limit
-    is named and not drawn, and where no joint has one the unit is the joint's. Below are σ_min and manipulability
-    √det(JJᵀ) along the way, with what the trajectory knows of singular sets that it crosses.
-
-    ValueError where the trajectory is empty or the chain has other joints.
-    """
-    if trajectory.t.size == 0:
-        raise ValueError(f"nothing to draw: the trajectory is empty, its plan {trajectory.status}")
-    n = trajectory.q.shape[1]
-    if chain is not None and chain.dof != n:
-        raise ValueError(f"the trajectory has {n} joints, the chain {chain.dof}")
-    nodes = trajectory.t
-    parts = np.linspace(0.0, 1.0, _STEP_SAMPLES, endpoint=False)
-    t = np.append((nodes[:-1, None] + np.diff(nodes)[:, None] * parts).ravel(), nodes[-1])
-    q, qdot, qddot = trajectory.sample(t)
-    names = chain.joint_names if chain is not None else tuple(f"joint {i + 1}" for i in range(n))
-    units = _joint_units(chain)
-
-    middle, position, velocity, acceleration = np.zeros(n), np.full(n, np.inf), np.full(n, np.inf), np.full(n, np.inf)
-    if chain is not None:
-        limits = chain.limits
-        position, velocity, acceleration = 0.5 * (limits.upper - limits.lower), limits.velocity, limits.acceleration
-        np.add(limits.lower, position, out=middle, where=np.isfinite(position))
-    rows = (
-        ("position", "", "middle 0, limits ±1", q - middle, position, "default"),
-        ("speed", "/s", "/ limit", qdot, velocity, "default"),
-        ("acceleration", "/s²", "/ limit", qddot, acceleration, "default" if trajectory.cubic else "steps-post"),
-    )
-    count = 3 if chain is None else 5
-    figure = Figure(figsize=(8.0, 1.9 * count + 1.0), layout="constrained")
-    FigureCanvasAgg(figure)
-    panels: list[Axes] = list(figure.subplots(count, 1, sharex=True))
-    for axes, (what, per, part, values, limit, style) in zip(panels[:3], rows, strict=True):
-        known = np.isfinite(limit) & (limit > 0.0)
-        scaled = bool(known.any())
-        if scaled:
-            values = values / np.where(known, limit, 1.0)
-            _limit_lines(axes, max(1.15, 1.05 * float(np.abs(values[:, known]).max())), f"joint {what}\n{part}")
-        else:
-            axes.set_ylabel(f"joint {what}\n[{' or '.join(unit + per for unit in units)}]")
-            axes.grid(True, color="0.9", linewidth=0.6)
-        for joint in np.flatnonzero(known) if scaled else range(n):
-            axes.plot(
-                t, values[:, joint], label=names[joint], drawstyle=style, linewidth=1.2, **_joint_style(int(joint))
-            )
-        if scaled and not known.all():
-            missing = ", ".join(names[joint] for joint in np.flatnonzero(~known))
-            axes.set_title(f"without limit, not drawn: {missing}", fontsize=8, color="0.35", loc="right")
-    if chain is not None:
-        jacobians = chain.jacobian(q)
-        for axes, label, index in (
-            (panels[3], r"$\sigma_{min}$", indices.min_singular_value),
-            (panels[4], "manipulability\n" + r"$\sqrt{\det JJ^T}$", indices.manipulability),
-        ):
-            axes.plot(t, index(jacobians), color="black", linewidth=1.2)
-            axes.set_ylim(bottom=0.0)
-            axes.set_ylabel(label)
-            axes.grid(True, color="0.9", linewidth=0.6)
-            for crossing in trajectory.clearance.crossings if trajectory.clearance is not None else ():
-                axes.axvline(crossing.t, color="#D55E00", linewidth=0.9, linestyle=(0, (4, 3)))
-                if axes is panels[3]:
-                    axes.annotate(
-                        crossing.name,
-                        (crossing.t, 0.97),
-                        xycoords=axes.get_xaxis_transform(),
-                        xytext=(3.0, 0.0),
-                        textcoords="offset points",
-                        va="top",
-                        rotation=90,
-                        color="#D55E00",
-                        fontsize=8,
-                    )
-    for axes in panels:
-        axes.spines[["top", "right"]].set_visible(False)
-        axes.tick_params(labelsize=8)
-    panels[-1].set_xlabel("time [s]")
-    if t[-1] > t[0]:
-        panels[-1].set_xlim(t[0], t[-1])
-    shown = {
-        label: handle for axes in panels[:3] for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
-    }
-    figure.legend(
-        [shown[name] for name in names if name in shown],
-        [name for name in names if name in shown],
-        loc="outside lower center",
-        ncols=min(len(shown), 8),
-        frameon=False,
-        fontsize=9,
-    )
-    return figure
-
-
-def _joint_style(joint: int) -> dict[str, Any]:
-    return {"color": _JOINTS[joint % len(_JOINTS)], "linestyle": _DASHES[joint // len(_JOINTS)]}
-
-
-def _joint_units(chain: Chain | None) -> tuple[str, ...]:
-    """Of positions; both where nobody knows the joints."""
-    if chain is None:
-        return ("rad", "m")
-    return tuple(dict.fromkeys("m" if kind == "prismatic" else "rad" for kind in chain.joint_types))
-
-
 def _tool_path(axes: Axes, trace: Trace, here: NDArray[np.bool_], plane: tuple[int, int]) -> None:
     x, y = plane
     tip = trace.tip[here]
@@ -363,19 +229,6 @@ def _tool_path(axes: Axes, trace: Trace, here: NDArray[np.bool_], plane: tuple[i
     axes.tick_params(labelsize=8)
     axes.set_xlabel(f"tool {'xyz'[x]} [m]", fontsize=9)
     axes.set_ylabel(f"tool {'xyz'[y]} [m]", fontsize=9)
-
-
-def save_figure(figure: Figure, file: str | pathlib.Path, dpi: int = 110) -> pathlib.Path:
-    """Writes a PNG of at most 256 colours, which keeps it small. Returns the file's path."""
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=dpi, facecolor="white")
-    buffer.seek(0)
-
-    def write(stream: BinaryIO) -> None:
-        image = Image.open(buffer).convert("RGB").quantize(256, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
-        image.save(stream, format="PNG", optimize=True)
-
-    return write_atomically(pathlib.Path(file), write)
 
 
 def _layer(run: Run) -> tuple[bool, bool]:
@@ -398,7 +251,7 @@ def _styles(runs: Sequence[Run]) -> dict[str, tuple[str, object]]:
     for family, variants in families.items():
         for i, label in enumerate(variants):
             colour = _COLOURS.get(family, "black")
-            dash: object = _DASHES[i % len(_DASHES)]
+            dash: object = DASHES[i % len(DASHES)]
             if family == "jparse" and len(variants) > 2:
                 colour, dash = _SWEEP[round(i * (len(_SWEEP) - 1) / (len(variants) - 1))], "-"
             styles[label] = (colour, dash)

@@ -15,11 +15,10 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
+from ._types import Array
 from .experiments.axis5 import VARIANTS, Track
 
 __all__ = ["axis_figure", "error_figure", "overview_figure"]
-
-Array = NDArray[np.float64]
 
 # Okabe and Ito's colours. The closed form is orange everywhere.
 _COLOURS = {

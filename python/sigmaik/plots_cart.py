@@ -10,7 +10,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from . import _core
-from .experiments.cart import METHODS, Array, CartExperiment, CartRun, cart_xy, density
+from ._types import Array
+from .experiments.cart import METHODS, CartExperiment, CartRun, cart_xy, density
 from .planning.cart import CartMotion
 
 __all__ = ["joints_figure", "laws_figure", "plane_figure"]

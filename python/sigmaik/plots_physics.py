@@ -9,15 +9,14 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from numpy.typing import NDArray
 
+from ._plotting import JOINT_COLOURS
+from ._types import Array
 from .experiments.execute import ExecuteRun
 from .experiments.physics import PhysicsRun
-from .plots import _JOINTS, _name_waypoints, _styles
+from .plots import _name_waypoints, _styles
 
 __all__ = ["execution_figure", "physics_figure"]
-
-Array = NDArray[np.float64]
 
 
 def physics_figure(runs: Sequence[PhysicsRun]) -> Figure:
@@ -120,7 +119,7 @@ def execution_figure(runs: Sequence[ExecuteRun]) -> Figure:
         for row, (label, values) in enumerate(rows):
             axes = grid[row][column]
             for joint in range(values.shape[1]):
-                colour = _JOINTS[joint % len(_JOINTS)]
+                colour = JOINT_COLOURS[joint % len(JOINT_COLOURS)]
                 shown = np.maximum(values, 1e-4) if row == 1 else values
                 axes.plot(done.t, shown[:, joint], color=colour, linewidth=1.0, label=names[joint])
                 if row == 0:

@@ -8,14 +8,12 @@ from typing import Any, Literal
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from ._types import Array
 from .experiments.track import Follow
 from .plots import method_colour
 
 __all__ = ["event_figure", "path_figure", "time_figure"]
-
-Array = NDArray[np.float64]
 
 # Okabe and Ito's colours.
 _MODES = {"predict": "#0072B2", "interpolate": "#009E73", "hold": "#E69F00", "raw": "#D55E00", "true": "#000000"}

@@ -21,17 +21,16 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from . import _core
-from .console import need
+from ._extras import need
+from ._types import Array
 
 if TYPE_CHECKING:
     from .planning import Trajectory
 
 __all__ = ["Execution", "Measurement", "Simulation", "execute"]
-
-Array = NDArray[np.float64]
 
 _GRAVITY = (0.0, 0.0, -9.80665)
 
@@ -97,9 +96,9 @@ class Simulation:
         seed: of the noise
 
         Error where a value is out of its range, where timestep does not divide control_period, or where Dynamics
-        refuses; console.MissingPackage where MuJoCo is not installed.
+        refuses; MissingPackage where MuJoCo is not installed.
         """
-        need("mujoco", "sim")
+        need("mujoco")
         if actuation not in ("velocity", "torque"):
             raise _core.Error(f"actuation = {actuation!r} must be 'velocity' or 'torque'")
         for name, value in (("timestep", timestep), ("control_period", control_period), ("bandwidth", bandwidth)):

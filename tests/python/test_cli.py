@@ -221,9 +221,7 @@ def test_output_folder_that_cannot_be(capsys, tmp_path, waypoints):
 def test_missing_extras_are_named(capsys, monkeypatch, package, arguments):
     find = importlib.util.find_spec
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == package else find(name))
-    assert refused(capsys, *arguments) == (
-        f"sigmaik: {package} is not installed; pip install 'sigmaik[demo]' brings it\n"
-    )
+    assert refused(capsys, *arguments) == (f"sigmaik: {package} is not installed; pip install {package} brings it\n")
 
 
 def test_a_closed_pipe_is_no_error():

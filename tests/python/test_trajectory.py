@@ -7,9 +7,9 @@ import pytest
 from PIL import Image
 
 import sigmaik as sk
-from sigmaik.console import MissingPackage
+from sigmaik._extras import MissingPackage
 
-plots = pytest.importorskip("sigmaik.plots")
+figure = pytest.importorskip("sigmaik.planning.figure")
 
 START = sk.robots.home("franka_panda")
 GOAL = START + np.array([0.4, 0.2, -0.3, 0.2, 0.3, -0.2, 0.1])
@@ -32,7 +32,7 @@ def drawn(axes, joint):
 
 
 def test_the_figure_has_parts_of_limits_and_indices(arm, plan):
-    axes = plots.trajectory_figure(plan, arm).axes
+    axes = figure.trajectory_figure(plan, arm).axes
     assert len(axes) == 5
     limits = arm.limits
     middle, half = 0.5 * (limits.upper + limits.lower), 0.5 * (limits.upper - limits.lower)
@@ -49,7 +49,7 @@ def test_the_figure_has_parts_of_limits_and_indices(arm, plan):
 
 
 def test_the_figure_without_a_chain(plan):
-    axes = plots.trajectory_figure(plan).axes
+    axes = figure.trajectory_figure(plan).axes
     assert [panel.get_ylabel().split("\n")[1] for panel in axes] == ["[rad or m]", "[rad/s or m/s]", "[rad/s² or m/s²]"]
     for row, values in enumerate(("q", "qdot", "qddot")):
         t, line = drawn(axes[row], "joint 3")
@@ -59,7 +59,7 @@ def test_the_figure_without_a_chain(plan):
 def test_joints_without_limits(arm, plan):
     free = np.array([np.inf] + 6 * [3.0])
     some = arm.with_limits(lower=-free, upper=free, acceleration=np.inf)
-    axes = plots.trajectory_figure(plan, some).axes
+    axes = figure.trajectory_figure(plan, some).axes
     assert axes[0].get_legend_handles_labels()[1] == list(arm.joint_names[1:])
     assert arm.joint_names[0] in axes[0].get_title(loc="right")
     assert axes[2].get_ylabel().endswith("[rad/s²]")
@@ -71,7 +71,7 @@ def test_crossings_are_named():
     bent = np.array([0.1, 0.5, 0.1, 1.2, 0.1, 0.8, 0.1])
     crossing = sk.planning.time_optimal(iiwa, bent, bent * [1, 1, 1, -1, 1, 1, 1])
     assert crossing.clearance.crossings
-    texts = [text.get_text() for text in plots.trajectory_figure(crossing, iiwa).axes[3].texts]
+    texts = [text.get_text() for text in figure.trajectory_figure(crossing, iiwa).axes[3].texts]
     assert texts == [c.name for c in crossing.clearance.crossings]
 
 
@@ -80,7 +80,7 @@ def test_motions_of_planners_with_cubic_steps(arm, tmp_path):
     assert smooth.cubic
     with Image.open(smooth.plot(tmp_path / "new" / "smooth.png", arm)) as picture:
         assert picture.size[0] > 600
-    t, line = drawn(plots.trajectory_figure(smooth).axes[2], "joint 1")
+    t, line = drawn(figure.trajectory_figure(smooth).axes[2], "joint 1")
     np.testing.assert_allclose(line, smooth.sample(t)[2][:, 0])
 
 
@@ -97,7 +97,7 @@ def test_plot_writes_whole_or_nothing(arm, plan, tmp_path, monkeypatch):
     with pytest.raises(ValueError, match="empty, its plan failed"):
         failed.plot(tmp_path / "failed.png")
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
-    with pytest.raises(MissingPackage, match=r"sigmaik\[plot\]"):
+    with pytest.raises(MissingPackage, match="matplotlib is not installed; pip install matplotlib brings it"):
         plan.plot(tmp_path / "missing.png")
     assert [file.name for file in tmp_path.iterdir()] == ["plan.png"]
 

@@ -6,14 +6,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 import sigmaik as sk
+from sigmaik._types import Array
 from sigmaik.planning import ArmSpheres, Box, Obstacles, Trajectory, arm_spheres, min_distance, stochastic
 
 __all__ = ["TABLE", "Along", "Scene", "along", "load_scene", "plan"]
-
-Array = NDArray[np.float64]
 
 ROBOT = "kuka_lbr_iiwa_14_r820"
 TABLE = Box(size=(0.5, 1.0, 0.04), pose=(0.65, 0.0, 0.45))

@@ -32,6 +32,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import sigmaik as sk
+from sigmaik._types import Array
 
 from .storage import write_atomically, write_csv
 
@@ -55,8 +56,6 @@ __all__ = [
     "summarize",
     "summary_table",
 ]
-
-Array = NDArray[np.float64]
 
 ROBOT = "kuka_kr6_r900"
 EXAMPLES = (1, 2)

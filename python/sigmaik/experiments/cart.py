@@ -16,18 +16,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 import sigmaik as sk
 from sigmaik import _core
+from sigmaik._types import Array
 from sigmaik.planning.cart import PUBLISHED_ITERATIONS, CartMotion, cart_motion, evaluate_cart_motion
 from sigmaik.planning.cart_path import PosePath, pose_paths
 from sigmaik.planning.cart_plane import PlaneCartMotion, cart_motion_plane
 from sigmaik.planning.cart_trajectory import follow
 
 __all__ = ["METHODS", "VARIANTS", "CartExperiment", "CartRun", "cart_xy", "density", "descent", "experiment", "run"]
-
-Array = NDArray[np.float64]
 
 VARIANTS = ("fk", "paper")
 METHODS = {

@@ -8,9 +8,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 import sigmaik as sk
+from sigmaik._types import Array
 from sigmaik.files import write_atomically
 from sigmaik.sim import Execution, Simulation, execute
 
@@ -18,8 +18,6 @@ from .physics import PhysicsSettings, simulation
 from .storage import write_csv
 
 __all__ = ["ExecuteRun", "drive", "save_executions", "variants"]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -22,9 +22,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 import sigmaik as sk
+from sigmaik._types import Array
 
 from .methods import NamedMethod, parse_method
-from .reach import load_arm
 from .storage import write_atomically
 
 __all__ = [
@@ -43,8 +43,6 @@ __all__ = [
     "shown_trial",
     "summarize_limits",
 ]
-
-Array = NDArray[np.float64]
 
 #: What is compared, and what it is.
 VARIANTS: dict[str, str] = {
@@ -247,7 +245,7 @@ def load_limits(
             raise ValueError(f"{name} must be positive and finite, not {value:g}")
     if settings.trials < 1 or settings.seed < 0:
         raise ValueError("trials must be positive, and seed not negative")
-    label, chain, home = load_arm(robot, base, tip)
+    label, chain, home, _ = sk.robots.open(robot, base, tip)
     for name, limit in (("acceleration", settings.acceleration), ("jerk", settings.jerk)):
         if limit is not None:
             if not limit > 0.0:

@@ -24,9 +24,9 @@ from dataclasses import asdict, dataclass, fields
 from typing import Any, Literal, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 import sigmaik as sk
+from sigmaik._types import Array
 from sigmaik.planning import Trajectory, time_optimal
 
 __all__ = [
@@ -41,8 +41,6 @@ __all__ = [
     "solve_sample",
     "summarize_study",
 ]
-
-Array = NDArray[np.float64]
 Objective = Literal["none", "manipulability", "potential"]
 
 OBJECTIVES: tuple[Objective, ...] = ("none", "manipulability", "potential")

@@ -18,13 +18,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 import sigmaik as sk
+from sigmaik._types import Array
 
 __all__ = ["Line", "Path", "Segment", "names", "named", "read_waypoints", "rotation_rpy"]
-
-Array = NDArray[np.float64]
 #: [s] for each waypoint in the paper's simulations.
 DWELL = 14.3
 

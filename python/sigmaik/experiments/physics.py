@@ -21,9 +21,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 import sigmaik as sk
+from sigmaik._types import Array
 from sigmaik.files import write_atomically
 from sigmaik.sim import Measurement, Simulation
 
@@ -42,8 +42,6 @@ __all__ = [
     "simulation",
     "summarize_physics",
 ]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

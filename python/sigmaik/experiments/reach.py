@@ -11,14 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 import sigmaik as sk
+from sigmaik._types import Array
 
 from . import paths
 from .methods import NamedMethod
 from .settings import Settings, published
 
-__all__ = ["Experiment", "Run", "load", "load_arm", "run"]
-
-Array = NDArray[np.float64]
+__all__ = ["Experiment", "Run", "load", "run"]
 
 
 @dataclass(frozen=True)
@@ -101,26 +100,6 @@ class Run:
         return None if line is None else line.deviation(self.tip)
 
 
-def load_arm(robot: str, base: str | None = None, tip: str | None = None) -> tuple[str, sk.Chain, Array]:
-    """Name, chain and home (n,) of a shipped arm, or of a URDF file.
-
-    Home of a URDF file is the middle of its joint ranges, or where that is singular the best conditioned of
-    32 random configurations (of fixed seeds). ValueError where there is no such arm, or no such file.
-    """
-    if robot in sk.robots.names():
-        if base is None and tip is None:
-            return robot, sk.robots.load(robot), sk.robots.home(robot)
-        source, label = sk.robots.path(robot), robot
-    else:
-        source = pathlib.Path(robot)
-        label = source.stem
-        if not source.is_file():
-            shipped = ", ".join(sk.robots.names())
-            raise ValueError(f"no shipped arm and no URDF file '{robot}'; shipped are {shipped}")
-    chain = sk.Chain.from_urdf(str(source), base=base, tip=tip)
-    return label, chain, _middle(chain)
-
-
 def load(
     robot: str,
     path: str | pathlib.Path | paths.Path,
@@ -138,7 +117,7 @@ def load(
     changes: settings by name that go before all of these, where they are not None
     ValueError where a part is unknown, or of the wrong size for the arm.
     """
-    label, chain, home = load_arm(robot, base, tip)
+    label, chain, home, _ = sk.robots.open(robot, base, tip)
     if not isinstance(path, paths.Path):
         if pathlib.Path(path).suffix.lower() in (".csv", ".json") or pathlib.Path(path).is_file():
             path = paths.read_waypoints(path)
@@ -209,20 +188,6 @@ def run(
         if progress is not None and (k + 1) % stride == 0:
             progress(stride)
     return Run(experiment, method, velocity_limits, t, index, q, qdot, target, error, singular_values, status, scale)
-
-
-def _middle(chain: sk.Chain) -> Array:
-    lower, upper = chain.limits.lower, chain.limits.upper
-    bounded = np.isfinite(lower) & np.isfinite(upper)
-    middle = np.where(bounded, 0.5 * (np.where(bounded, lower, 0.0) + np.where(bounded, upper, 0.0)), 0.0)
-    if _ratio(chain, middle) > 0.02:
-        return middle
-    return max((chain.random_configuration(seed) for seed in range(32)), key=lambda q: _ratio(chain, q))
-
-
-def _ratio(chain: sk.Chain, q: Array) -> float:
-    s = np.linalg.svd(chain.jacobian(q), compute_uv=False)
-    return float(s[-1] / s[0]) if s[0] > 0.0 else 0.0
 
 
 def _sized(name: str, values: tuple[float, ...] | None, default: Array, chain: sk.Chain) -> Array:

@@ -14,13 +14,11 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 import sigmaik as sk
+from sigmaik._types import Array
 
 __all__ = ["METHODS", "PAPER", "ROBOTS", "Planning", "ReachingSummary", "Run", "solve_task", "summarize_runs", "task"]
-
-Array = NDArray[np.float64]
 
 ROBOTS = ("ur10", "kinova_jaco2_7dof_spherical", "kuka_lbr_iiwa_14_r820")
 METHODS = {

@@ -22,10 +22,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 import sigmaik as sk
+from sigmaik._types import Array
 
 from .methods import NamedMethod
 from .paths import make_pose, rotation_rpy
-from .reach import load_arm
 from .storage import write_atomically, write_csv
 
 __all__ = [
@@ -44,8 +44,6 @@ __all__ = [
     "save_track_summary",
     "summarize_track",
 ]
-
-Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
 #: Names of targets, and what they are. All begin and end at the arm's home, and at rest.
@@ -279,7 +277,7 @@ def load_track(
             raise ValueError(f"{name} must be in [0, 1), not {getattr(camera, name):g}")
     if s.seed < 0:
         raise ValueError("seed must not be negative")
-    label, chain, home = load_arm(robot, base, tip)
+    label, chain, home, _ = sk.robots.open(robot, base, tip)
     for name, own, spare in (("acceleration", s.acceleration, ACCELERATION), ("jerk", s.jerk, JERK)):
         limit = np.asarray(getattr(chain.limits, name))
         if own is not None and not own > 0.0:

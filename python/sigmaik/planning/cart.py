@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from sigmaik import _core
 from sigmaik._core import CartError, CartRegion, Error
+from sigmaik._types import Array
 
 __all__ = ["CartError", "CartMotion", "CartRegion", "Guess", "Method", "cart_motion", "evaluate_cart_motion"]
 
-Array = NDArray[np.float64]
 Method = Literal["exact", "gradient"]
 Guess = Literal["linear", "admissible"]
 

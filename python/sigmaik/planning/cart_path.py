@@ -6,13 +6,12 @@ import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from sigmaik import _core
+from sigmaik._types import Array
 
 __all__ = ["PosePath", "pose_paths", "smooth", "when_smooth"]
-
-Array = NDArray[np.float64]
 
 PosePath = Callable[[Array], Array]
 """Poses (K, 4, 4) at parameters s (K,) in [0, 1]."""

@@ -6,15 +6,14 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from sigmaik import _core
+from sigmaik._types import Array
 
 from .cart import TOLERANCE, azimuth_turn, least_distance, planar_path, positive
 
 __all__ = ["PlaneCartMotion", "cart_motion_plane", "evaluate_cart_motion_plane"]
-
-Array = NDArray[np.float64]
 Range = tuple[float, float]
 
 EVERYWHERE = (-math.inf, math.inf)

@@ -9,17 +9,16 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from sigmaik import _core
 from sigmaik._core import Chain
+from sigmaik._types import Array
 
 from .cart import CartMotion, cart_motion
 from .cart_path import PosePath, pose_paths, smooth, when_smooth
 
 __all__ = ["CartTrajectory", "Shape", "ShoulderCylinder", "cart_trajectory", "follow", "shoulder_cylinder"]
-
-Array = NDArray[np.float64]
 Shape = Literal["line", "spline"]
 Profile = Literal["constant", "smooth"]
 

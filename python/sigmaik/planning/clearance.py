@@ -11,15 +11,14 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+
+from sigmaik._types import Array
 
 if TYPE_CHECKING:
     from sigmaik import Chain
     from sigmaik.singularities import SingularSets
 
 __all__ = ["Clearance", "Crossing", "clearance"]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import os
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from sigmaik import _core
 from sigmaik._core import ArmSpheres, Chain, DistanceField, JointCost
+from sigmaik._types import Array
 
 from .obstacles import Obstacles
 
 __all__ = ["arm_spheres", "collision_cost", "min_distance"]
-
-Array = NDArray[np.float64]
 
 
 def arm_spheres(chain: Chain, source: str | os.PathLike[str] | None = None, radius: float = 0.05) -> ArmSpheres:

@@ -9,16 +9,15 @@ import time
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sigmaik import singularities
 from sigmaik._core import Chain
+from sigmaik._extras import need
+from sigmaik._types import Array
 
 from .objective import Ends, Objective, Sets
 
 __all__ = ["solve"]
-
-Array = NDArray[np.float64]
 
 TOLERATED = 1e-6
 """What constraints may be broken by, or the plan has failed."""
@@ -82,10 +81,9 @@ def solve(
 
 
 def _casadi() -> Any:
-    try:
-        import casadi
-    except ImportError as error:
-        raise ValueError("solver='ipopt' needs CasADi: pip install 'sigmaik[plan]'") from error
+    need("casadi")
+    import casadi
+
     return casadi
 
 

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from sigmaik._core import DistanceField, Error
+from sigmaik._extras import need
+from sigmaik._types import Array
 
 __all__ = ["Box", "Cylinder", "Obstacles", "Shape", "Sphere"]
-
-Array = NDArray[np.float64]
 
 MOST_NODES = 20_000_000
 """Of a grid: 80 MB."""
@@ -190,12 +190,11 @@ class Obstacles:
         axes; `cell` [m] a cell's side. A surface lies half a cell from the centres on either side of it, exact where it
         is parallel to an axis; elsewhere a distance is up to 0.37 cells too large outside, and too deep inside.
 
-        Error where no cell is occupied, or none is free; where SciPy is not installed, with the name of the extra.
+        Error where no cell is occupied, or none is free; MissingPackage where SciPy is not installed.
         """
-        try:
-            from scipy.ndimage import distance_transform_edt  # type: ignore[import-untyped]
-        except ImportError as error:
-            raise Error("an occupancy grid needs SciPy: pip install 'sigmaik[obstacles]'") from error
+        need("scipy")
+        from scipy.ndimage import distance_transform_edt  # type: ignore[import-untyped]
+
         inside = np.asarray(occupied)
         if inside.ndim != 3:
             raise Error(f"occupied has shape {inside.shape}, needs (X, Y, Z)")

@@ -6,15 +6,13 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sigmaik._core import Servo, Status, pose_error
+from sigmaik._types import Array
 
 from .trajectory import Trajectory
 
 __all__ = ["Playback", "play"]
-
-Array = NDArray[np.float64]
 
 AT_START = 1e-6
 """[rad or m] by which a servo's joints may differ from a trajectory's first ones."""

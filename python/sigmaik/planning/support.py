@@ -10,10 +10,11 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from sigmaik import _core, indices, singularities
 from sigmaik._core import ArmSpheres, Chain, DistanceField, JointCost
+from sigmaik._types import Array
 
 from .batch_cost import BatchCost
 from .clearance import clearance
@@ -22,8 +23,6 @@ from .obstacles import Obstacles
 from .trajectory import Trajectory
 
 __all__ = ["Index", "gradient", "stochastic"]
-
-Array = NDArray[np.float64]
 Index = Literal["geometry_aware", "manipulability"]
 
 DEVIATION = 0.5

@@ -9,10 +9,11 @@ import time
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from sigmaik import _core, singularities
 from sigmaik._core import Chain
+from sigmaik._types import Array
 
 from . import nlp
 from .clearance import Crossing, clearance
@@ -20,8 +21,6 @@ from .objective import Avoid, Ends, Objective, Sets, Solver
 from .trajectory import Trajectory
 
 __all__ = ["ETA1", "ETA2", "Avoid", "Solver", "time_optimal"]
-
-Array = NDArray[np.float64]
 
 ETA1 = math.log(2400.0)
 """log of a potential's height (Beck et al. 2022, table 2)."""

@@ -8,9 +8,10 @@ from dataclasses import asdict, dataclass, field, fields, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from sigmaik.console import need
+from sigmaik._extras import need
+from sigmaik._types import Array
 from sigmaik.files import write_atomically
 
 from .clearance import Clearance, Crossing
@@ -19,8 +20,6 @@ if TYPE_CHECKING:
     from sigmaik import Chain
 
 __all__ = ["Trajectory"]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -98,18 +97,20 @@ class Trajectory:
         )
 
     def plot(self, file: str | pathlib.Path, chain: Chain | None = None) -> pathlib.Path:
-        """Writes a picture, `plots.trajectory_figure`, as PNG, whole or not at all. Returns its path.
+        """Writes a picture, `planning.figure.trajectory_figure`, as PNG, whole or not at all. Returns its path.
 
         ValueError where there is nothing to draw, the chain has other joints, or the file's name does not end in .png;
-        console.MissingPackage where matplotlib is not installed.
+        MissingPackage where matplotlib is not installed.
         """
         file = pathlib.Path(file)
         if file.suffix.lower() != ".png":
             raise ValueError(f"{file} must end in .png")
-        need("matplotlib", "plot")
-        from sigmaik import plots
+        need("matplotlib")
+        from sigmaik._plotting import save_figure
 
-        return plots.save_figure(plots.trajectory_figure(self, chain), file)
+        from .figure import trajectory_figure
+
+        return save_figure(trajectory_figure(self, chain), file)
 
     def save(self, file: str | pathlib.Path) -> pathlib.Path:
         """Writes an npz file that numpy.load reads without pickles, whole or not at all. Returns its path."""

@@ -3,6 +3,7 @@
     >>> import sigmaik as sk
     >>> chain = sk.robots.load("ufactory_xarm7")
     >>> q = sk.robots.home("ufactory_xarm7")
+    >>> arm = sk.robots.open("arm.urdf")          # a name, or a file of your own: arm.chain, arm.home
 
 Each file says in its first lines where its figures come from and what to know before using it.
 The tip of every arm is its mechanical flange (link ``flange``), the base the root link.
@@ -12,17 +13,31 @@ from __future__ import annotations
 
 import difflib
 import json
+import os
 from importlib import resources
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sigmaik._core import Chain
+from sigmaik._types import Array
 
-__all__ = ["home", "load", "names", "path"]
+__all__ = ["Arm", "home", "load", "names", "open", "path"]
 
 _SUFFIX = ".urdf"
+
+
+class Arm(NamedTuple):
+    """An arm, shipped or of a file, with a configuration to start from."""
+
+    name: str
+    """Of the shipped arm, or of the file without its suffix."""
+    chain: Chain
+    home: Array
+    """(n,) [rad or m] inside the limits and away from singularities."""
+    path: Path
+    """Of the URDF file."""
 
 
 def names() -> tuple[str, ...]:
@@ -46,7 +61,7 @@ def load(name: str) -> Chain:
     return Chain.from_urdf(str(path(name)), tip="flange")
 
 
-def home(name: str) -> NDArray[np.float64]:
+def home(name: str) -> Array:
     """Joint angles (n,) [rad] of a pose inside the limits and away from singularities.
 
     A new array each time. ValueError where no arm of that name is shipped.
@@ -54,6 +69,42 @@ def home(name: str) -> NDArray[np.float64]:
     _check(name)
     table = json.loads((resources.files(__name__) / "homes.json").read_text(encoding="utf-8"))
     return np.array(table[name], dtype=np.float64)
+
+
+def open(arm: str | os.PathLike[str], base: str | None = None, tip: str | None = None) -> Arm:
+    """A shipped arm by its name, or the arm of a URDF file by its path.
+
+    base, tip: link names; by default the root and the only leaf, of a shipped arm the root and ``flange``
+
+    The home of a file, and of a shipped arm between other links, is the middle of the joint ranges; where the arm is
+    singular there, home is the best conditioned of 32 random configurations (of fixed seeds). ValueError where no arm
+    and no file has that name, or where the file describes no chain.
+    """
+    if arm in names():
+        name, file = str(arm), path(str(arm))
+        if base is None and tip is None:
+            return Arm(name, load(name), home(name), file)
+    else:
+        file = Path(arm)
+        name = file.stem
+        if not file.is_file():
+            raise ValueError(f"no shipped arm and no URDF file '{arm}'; shipped are {', '.join(names())}")
+    chain = Chain.from_urdf(str(file), base=base, tip=tip)
+    return Arm(name, chain, _middle(chain), file)
+
+
+def _middle(chain: Chain) -> Array:
+    lower, upper = chain.limits.lower, chain.limits.upper
+    bounded = np.isfinite(lower) & np.isfinite(upper)
+    middle = np.where(bounded, 0.5 * (np.where(bounded, lower, 0.0) + np.where(bounded, upper, 0.0)), 0.0)
+    if _inverse_condition(chain, middle) > 0.02:
+        return middle
+    return max((chain.random_configuration(seed) for seed in range(32)), key=lambda q: _inverse_condition(chain, q))
+
+
+def _inverse_condition(chain: Chain, q: Array) -> float:
+    sigma = np.linalg.svd(chain.jacobian(q), compute_uv=False)
+    return float(sigma[-1] / sigma[0]) if sigma[0] > 0.0 else 0.0
 
 
 def _check(name: str) -> None:

@@ -13,13 +13,11 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sigmaik._core import Chain
+from sigmaik._types import Array
 
 __all__ = ["FoundSet", "find", "singular_configurations"]
-
-Array = NDArray[np.float64]
 
 SINGULAR = 1e-10
 """σ_min/σ_max below which a configuration is singular."""

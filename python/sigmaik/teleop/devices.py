@@ -11,13 +11,11 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-from sigmaik.console import need
+from sigmaik._extras import need
+from sigmaik._types import Array
 
 __all__ = ["DEVICES", "DeviceError", "Gamepad", "Reading", "SpaceMouse", "TwistDevice", "open_device"]
-
-Array = NDArray[np.float64]
 
 DEAD_ZONE = 0.12  #: of a stick's travel, in which it counts as let go
 
@@ -49,7 +47,7 @@ class Gamepad:
     """The first gamepad that SDL finds. Left stick: x and y; right stick: turn about z, and z; triggers: none."""
 
     def __init__(self) -> None:
-        need("pygame", "devices")
+        need("pygame")
         os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
         os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
         os.environ.setdefault("SDL_JOYSTICK_ALLOW_BACKGROUND_EVENTS", "1")
@@ -84,7 +82,7 @@ class SpaceMouse:
     """The first SpaceMouse that is found."""
 
     def __init__(self) -> None:
-        need("pyspacemouse", "devices")
+        need("pyspacemouse")
         import pyspacemouse
 
         try:

@@ -10,16 +10,14 @@ import xml.etree.ElementTree as ElementTree
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 import sigmaik as sk
+from sigmaik._types import Array
 
 if TYPE_CHECKING:
     import viser
 
 __all__ = ["RobotView", "drawable"]
-
-Array = NDArray[np.float64]
 
 
 class RobotView:

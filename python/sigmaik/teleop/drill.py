@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sigmaik._types import Array
 from sigmaik.experiments.methods import ALL_METHODS
 
 from .episode import Episode
@@ -16,8 +16,6 @@ from .session import Session
 from .settings import Settings
 
 __all__ = ["ROBOTS", "Drill", "drill"]
-
-Array = NDArray[np.float64]
 
 ROBOTS = ("ufactory_xarm7", "kinova_gen3_7dof", "franka_panda", "ur10", "puma560")
 

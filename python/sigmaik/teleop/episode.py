@@ -32,14 +32,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 import sigmaik as sk
-from sigmaik.console import need
+from sigmaik._extras import need
+from sigmaik._types import Array
 from sigmaik.files import write_atomically
 
 from .settings import Settings
 
 __all__ = ["Arm", "Episode"]
-
-Array = NDArray[np.float64]
 Samples = NDArray[np.void]
 
 _LIMITS = ("lower", "upper", "velocity", "acceleration")
@@ -144,7 +143,7 @@ class Episode:
 
     def save_parquet(self, file: str | pathlib.Path, episode_index: int = 0) -> pathlib.Path:
         """Writes a parquet file, whole or not at all. Returns its path."""
-        need("pyarrow", "viewer")
+        need("pyarrow")
         return write_atomically(pathlib.Path(file), lambda stream: self._parquet(stream, episode_index))
 
     @staticmethod

@@ -7,13 +7,11 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 import sigmaik as sk
+from sigmaik._types import Array
 
 __all__ = ["joint_bars", "singular_bars", "status_text"]
-
-Array = NDArray[np.float64]
 
 _GREEN, _AMBER, _RED, _GREY, _TRACK = "#2f9e44", "#e8890c", "#d6336c", "#868e96", "#e9ecef"
 _COLOURS = {

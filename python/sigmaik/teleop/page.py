@@ -16,9 +16,9 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from sigmaik.console import need
+from sigmaik._extras import need
+from sigmaik._types import Array
 from sigmaik.experiments import methods
 
 from . import gauges
@@ -31,8 +31,6 @@ if TYPE_CHECKING:
     import viser
 
 __all__ = ["Page"]
-
-Array = NDArray[np.float64]
 
 DRAWN = 30.0  #: [Hz] the arm
 GAUGES = 10.0  #: [Hz] what stands beside it
@@ -62,10 +60,9 @@ class Page:
         directory: of recordings
         parquet: write them as parquet, too
         """
-        need("viser", "viewer")
-        need("yourdfpy", "viewer")
+        need("viser", "yourdfpy")
         if parquet:
-            need("pyarrow", "viewer")
+            need("pyarrow")
         import viser
 
         self.session, self.directory, self.parquet = session, pathlib.Path(directory), parquet

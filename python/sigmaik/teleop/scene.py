@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import sigmaik as sk
+from sigmaik._types import Array
 
 from .drawing import RobotView
 from .session import Session
@@ -17,8 +18,6 @@ if TYPE_CHECKING:
     import viser
 
 __all__ = ["Scene", "pose_of", "singular_directions"]
-
-Array = NDArray[np.float64]
 
 #: Colours of the tool's trace, by status.
 _TRACE = {

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import pathlib
 import threading
 from typing import Any
 
@@ -11,14 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import sigmaik as sk
-from sigmaik.experiments.reach import load_arm
+from sigmaik._types import Array
 
 from .episode import Arm, Episode
 from .settings import Settings
 
 __all__ = ["Session"]
-
-Array = NDArray[np.float64]
 Samples = NDArray[np.void]
 
 #: Joints whose acceleration limit nobody gave may do this [rad/s² or m/s²]: a hand's command is never smooth.
@@ -57,7 +54,7 @@ class Session:
         longest_recording: [cycles], where a recording ends by itself
         ValueError where one is wrong, with the facts.
         """
-        name, chain, home = load_arm(robot, base, tip)
+        name, chain, home, self.source = sk.robots.open(robot, base, tip)
         if not 1.0 <= rate <= 20e3:
             raise ValueError(f"rate must be from 1 to 20000 Hz, not {rate:g}")
         for what, value in (
@@ -74,7 +71,6 @@ class Session:
             joint for joint, limit in zip(chain.joint_names, known, strict=True) if not math.isfinite(limit)
         )
         self.name = name
-        self.source = sk.robots.path(robot) if robot in sk.robots.names() else pathlib.Path(robot)
         self.chain = chain.with_limits(acceleration=np.where(np.isfinite(known), known, acceleration))
         self.home: Array = home if start is None else np.array(start, dtype=np.float64)
         self.pose_timeout, self.twist_timeout = pose_timeout, twist_timeout

@@ -1,0 +1,33 @@
+"""Packages that only some functions need, and that a plain `pip install` leaves out."""
+
+from __future__ import annotations
+
+import importlib.util
+
+from ._core import Error
+
+__all__ = ["MissingPackage", "need"]
+
+#: What pip calls a module, where the two differ, or where a version is needed.
+_REQUIREMENTS = {"distributed": "'dask[distributed]'", "mujoco": "'mujoco>=3'", "viser": "'viser>=1'"}
+
+
+class MissingPackage(Error, ImportError):
+    """A function was called whose package is not installed. The text has the command that installs the package."""
+
+
+def need(*modules: str) -> None:
+    """Raises MissingPackage, with the command that installs them, where modules are not installed."""
+    missing = [module for module in modules if not _installed(module)]
+    if not missing:
+        return
+    verb, noun = ("is", "it") if len(missing) == 1 else ("are", "them")
+    command = " ".join(_REQUIREMENTS.get(module, module) for module in missing)
+    raise MissingPackage(f"{' and '.join(missing)} {verb} not installed; pip install {command} brings {noun}")
+
+
+def _installed(module: str) -> bool:
+    try:
+        return importlib.util.find_spec(module) is not None
+    except ImportError:
+        return False
