@@ -10,7 +10,8 @@ export SKBUILD_BUILD_DIR := build/python
 export SKBUILD_CMAKE_DEFINE := SIGMAIK_WERROR=$(WERROR)
 
 .NOTPARALLEL:
-.PHONY: help demo test test-browser stress bench wheel build install stubs stubs-check clean system
+.PHONY: help demo lint test test-browser test-clang test-asan test-tsan stress bench wheel build install stubs \
+        stubs-check clean system
 
 help:  ## this list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1  /p' Makefile | awk '{printf "  %s %-12s", $$1, $$2; $$1=$$2=""; print}'
@@ -18,10 +19,12 @@ help:  ## this list
 demo: .venv/.demo .venv/.package  ## a 7-joint arm driven beyond its reach by every method: a plot and its numbers
 	$(BIN)/sigmaik reach --robot ufactory_xarm7 --path extended-line --method all --out build/demo
 
-test: build .venv/.test .venv/.package  ## everything: install, stubs, types, C++ tests, Python tests
+lint: .venv/.test  ## format, style, types, spelling, and what the repository says of itself
+	tools/lint.sh
+
+test: lint build .venv/.test .venv/.package  ## everything: lint, install, stubs, C++ tests, Python tests
 	tools/check_install.sh build/release
 	tools/stubs.sh --check
-	$(BIN)/mypy
 	ctest --test-dir build/release --output-on-failure
 	$(BIN)/python -m pytest
 	$(MAKE) test-browser
@@ -29,6 +32,15 @@ test: build .venv/.test .venv/.package  ## everything: install, stubs, types, C+
 test-browser: .venv/.test .venv/.package  ## the page of `sigmaik teleop` in Chromium, without a screen (part of `make test`)
 	@tools/setup_system.sh $(PYTHON) chromium
 	$(BIN)/python -m pytest tests/browser
+
+test-clang:  ## everything in C++, and the Python module, compiled by clang; the C++ tests
+test-asan:  ## the C++ tests under the address and undefined-behaviour sanitizers
+test-tsan:  ## the C++ tests that use threads, under the thread sanitizer
+test-clang test-asan test-tsan: test-%: .venv/.build
+	@tools/setup_system.sh $(PYTHON) $(filter clang,$*)
+	cmake --preset $*
+	cmake --build --preset $*
+	ctest --preset $*
 
 stress: build/release/build.ninja  ## ten million random cycles into every limit: counts of what broke, which is nothing
 	cmake --build build/release --target sigmaik_stress

@@ -17,7 +17,9 @@ namespace {
 
 KDL::JntArray joints(const Eigen::VectorXd& values, int n, const char* what) {
   detail::require(values.size() == n, what, " has ", values.size(), " entries, the chain ", n, " joints");
-  KDL::JntArray array;
+  // KDL's library frees a JntArray's storage, so KDL's library must allocate it, too: the two Eigens may pad storage
+  // differently, as AddressSanitizer or -mavx makes them do. An assignment of the same size allocates nothing.
+  KDL::JntArray array(static_cast<unsigned>(n));
   array.data = values;
   return array;
 }

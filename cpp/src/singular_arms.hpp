@@ -83,13 +83,22 @@ struct SevenJoints {
 template <typename L, typename X>
 SIGMAIK_INLINE auto seven_joint_minors(const X& x) {
   const SevenJoints<L, X> e(x);
-  const auto s5 = x.s(q5), c5 = x.c(q5), s2 = x.s(q2), c2 = x.c(q2), s3 = x.s(q3), c3 = x.c(q3);
-  const auto k5 = c5 * e.K, sp = s5 * e.P, cp = c5 * e.P;
+  // One declaration each: a jet's type tells which joints the value depends on.
+  const auto s2 = x.s(q2);
+  const auto c2 = x.c(q2);
+  const auto s3 = x.s(q3);
+  const auto c3 = x.c(q3);
+  const auto s5 = x.s(q5);
+  const auto c5 = x.c(q5);
+  const auto k5 = c5 * e.K;
+  const auto sp = s5 * e.P;
+  const auto cp = c5 * e.P;
   const auto d5 = e.B * (s5 * s5 * e.F) + k5 * (L::twist5 * (x.c(q6) * e.P) + c5 * (e.B * x.s(q6) + L::a7));
   const auto hx = e.C * e.F + (L::a4 * L::a7) * (c5 * cp);
   const auto hy = (-L::a5 * L::a7) * (s5 * cp);
   const auto hz = e.A * e.F + (-L::d3 * L::a7) * (c5 * cp);
-  const auto u = c3 * hx - s3 * hy, w = s3 * hx + c3 * hy;
+  const auto u = c3 * hx - s3 * hy;
+  const auto w = s3 * hx + c3 * hy;
   return std::tuple(L::a7 * (s2 * (sp * cp)), s2 * d5, s2 * (sp * e.F), s2 * (e.P * k5), s2 * w, u, s2 * hz - c2 * u);
 }
 

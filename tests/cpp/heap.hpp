@@ -9,7 +9,16 @@
 #include <cerrno>
 #include <cstddef>
 
-#if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define SIGMAIK_TEST_SANITIZED 1
+#elif defined(__has_feature)  // clang
+#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
+#define SIGMAIK_TEST_SANITIZED 1
+#endif
+#endif
+
+// A sanitizer brings a heap of its own.
+#if defined(__GLIBC__) && !defined(SIGMAIK_TEST_SANITIZED)
 #define SIGMAIK_TEST_HEAP 1
 
 extern "C" {

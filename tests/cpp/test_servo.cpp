@@ -1060,6 +1060,7 @@ TEST_CASE("what avoidance refuses") {
   CHECK_THROWS_AS(make(known, {.what = Avoid::Potential, .potential = {.eta2 = 0.0}}), Error);
 }
 
+#ifdef SIGMAIK_TEST_HEAP
 TEST_CASE("avoidance touches no heap") {
   for (const char* name : {"franka_panda", "ufactory_xarm7"}) {
     const Chain& chain = test::arms().at(name);
@@ -1076,3 +1077,4 @@ TEST_CASE("avoidance touches no heap") {
     }
   }
 }
+#endif

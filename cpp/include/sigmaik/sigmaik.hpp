@@ -4,11 +4,14 @@
 ///
 /// Start here. Each header needs only those above it.
 ///
-///     types.hpp            JointVector, Jacobian, Twist [v; ω], Pose; sizes without heap
-///     status.hpp           Status: what a real-time call did        error.hpp   Error: what set-up refuses
-///     chain.hpp            Chain: the arm, immutable; from URDF     kdl.hpp     from and to KDL::Chain (not included)
+/// Included here:
+///
+///     types.hpp            JointVector, Jacobian, Twist [v; ω], Pose: sizes without heap
+///     error.hpp            Error: what set-up refuses
+///     status.hpp           Status: what a real-time call did
+///     chain.hpp            Chain: the arm, immutable; from URDF
 ///     pose.hpp             rotation_log, rotation_exp, pose_error
-///     kinematics.hpp       update(chain, q, state): pose and Jacobian; jacobian_gradient
+///     kinematics.hpp       update, jacobian_gradient: pose and Jacobian of an arm; the Jacobian's derivative
 ///     spectrum.hpp         Spectrum: singular value decomposition with a warm start
 ///     inverse.hpp          JParse, DampedLeastSquares, …: one rule per singular direction
 ///     task.hpp             Task: which rows of a twist, in which axes
@@ -16,26 +19,30 @@
 ///     batch.hpp            solve_batch: many at once
 ///     limits.hpp           LimitTracker: position, velocity, acceleration and jerk limits → this cycle's bounds
 ///     least_squares.hpp    LeastSquares: equalities, bounds and inequalities, always with an answer
-///     indices.hpp          manipulability, condition number, smallest singular value, geometry-aware index; gradients
+///     indices.hpp          IndexFunction: manipulability, condition number, least singular value, geometry-aware index
 ///     singularities.hpp    SingularSets: known singular sets of three arms, potentials, manipulability in closed form
 ///     avoidance.hpp        Avoidance: a posture velocity away from singularities
 ///     servo.hpp            Servo: pose or twist in, joint command out, each cycle
-///     servo_loop.hpp       ServoLoop: a servo in a thread of its own; stale commands stop the arm (not included)
 ///     target_stream.hpp    TargetStream: samples of a moving pose in, a smooth target out, each cycle
 ///     analytic_ik.hpp      AnalyticIk: every posture of a pose, for six joints with a spherical wrist
-///     dynamics.hpp         Dynamics: mass matrix, Coriolis, gravity, payload, by KDL (not included)
-///     computed_torque.hpp  ComputedTorque: joint torques along a planned motion (not included)
-///     constrained_ik.hpp   ConstrainedIk: a pose exactly in part, the rest as limits allow; time scaling (not
-///     included) planning/time_optimal.hpp  TimeOptimal: motions within limits, away from what a cost marks (not
-///     included) planning/support_states.hpp  SupportPlanner: smooth motions along which a cost is low, by gradient or
-///     samples planning/batch_cost.hpp    BatchCost: a cost of all support states at once, such as a user's own (not
-///     included) planning/costs.hpp         costs for both: potentials, manipulability, geometry-aware index (not
-///     included) planning/cart.hpp          cart_law: where to drive the cart of a cart-mounted arm, clear of a
-///     cylinder (not included) planning/cart_plane.hpp    plane_cart_law: the same with two linear axes (not included)
-///     planning/distance_field.hpp   DistanceField: signed distances to obstacles on a grid (not included)
-///     planning/arm_spheres.hpp      ArmSpheres: an arm as spheres, from a URDF's shapes or along its links (not
-///     included) planning/collision_costs.hpp  costs of obstacles, the arm itself, joint limits; min_distance (not
-///     included)
+///     dynamics.hpp         Dynamics: mass matrix, Coriolis, gravity, payload
+///     computed_torque.hpp  ComputedTorque: joint torques along a planned motion
+///     constrained_ik.hpp   ConstrainedIk: a pose exactly in part, the rest as limits allow; time scaling
+///
+/// To include by name:
+///
+///     servo_loop.hpp                ServoLoop: a servo in a thread of its own; stale commands stop the arm
+///     kdl.hpp                       from_kdl, to_kdl: from and to KDL::Chain; the one header that includes KDL
+///     planning/batch_cost.hpp       BatchCost: a cost of all support states at once, such as a user's own
+///     planning/joint_cost.hpp       JointCost: a smooth cost of joint positions, for both planners
+///     planning/costs.hpp            potentials, manipulability, geometry-aware index as costs; sums of costs
+///     planning/time_optimal.hpp     TimeOptimal: motions within limits, away from what a cost marks
+///     planning/support_states.hpp   SupportPlanner: smooth motions along which a cost is low, by gradient or samples
+///     planning/cart.hpp             cart_law: where to drive the cart of a cart-mounted arm, clear of a cylinder
+///     planning/cart_plane.hpp       plane_cart_law: the same with two linear axes
+///     planning/distance_field.hpp   DistanceField: signed distances to obstacles on a grid
+///     planning/arm_spheres.hpp      ArmSpheres: an arm as spheres, from a URDF's shapes or along its links
+///     planning/collision_costs.hpp  costs of obstacles, the arm itself and joint limits; min_distance
 ///
 /// Set-up throws Error. Calls marked "real time" are noexcept, bounded, and touch neither heap nor lock.
 
@@ -43,6 +50,9 @@
 #include <sigmaik/avoidance.hpp>
 #include <sigmaik/batch.hpp>
 #include <sigmaik/chain.hpp>
+#include <sigmaik/computed_torque.hpp>
+#include <sigmaik/constrained_ik.hpp>
+#include <sigmaik/dynamics.hpp>
 #include <sigmaik/error.hpp>
 #include <sigmaik/indices.hpp>
 #include <sigmaik/inverse.hpp>
