@@ -11,7 +11,7 @@
 Units are m, rad, s, N·m. Twists and Jacobians are [v; ω], in base axes, at the tip's origin.
 """
 
-from . import indices, planning, robots, sim, singularities
+from . import indices, methods, planning, robots, sim, singularities
 from ._core import (
     AdaptiveDampedLeastSquares,
     AnalyticBranch,
@@ -95,6 +95,7 @@ __all__ = [
     "__version__",
     "indices",
     "least_squares",
+    "methods",
     "planning",
     "pose_error",
     "robots",
