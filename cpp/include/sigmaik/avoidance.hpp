@@ -24,9 +24,9 @@ struct AvoidanceOptions {
   Avoid what = Avoid::None;
   double gain = 1.0;       ///< ≥ 0, q̇ = gain ∇m or −gain ∇Σφ
   double max_speed = 0.5;  ///< [rad/s or m/s] > 0, of the fastest joint: longer velocities are shortened to it
-  /// Lower and wider than a planner's: a velocity has to be felt before the set is there. φ is 1 on the set, and e^{-1}
-  /// at 1/√η₂ = 0.3 rad from it.
-  Potential potential{.eta1 = 0.0, .eta2 = 10.0};
+  /// η₁ and η₂ of the potentials. They are lower and wider than a planner's, because a velocity must act before the arm
+  /// reaches the set: φ is 1 on the set, and e^{-1} at 1/√η₂ = 0.3 rad from the set.
+  Potential potential{0.0, 10.0};
 };
 
 /// Real time once made.

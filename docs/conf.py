@@ -1,0 +1,67 @@
+"""The documentation site, built by `make docs`: the pages, the Python API and the C++ API."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import sigmaik
+
+project = "sigmaik"
+author = copyright = "The sigmaik authors"
+version = release = sigmaik.__version__
+
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "breathe"]
+
+# The source directory is the repository's root, so that every link between README.md and docs/ means the same file here
+# and on a Git forge.
+root_doc = "docs/index"
+include_patterns = ["*.md", "docs/**"]
+exclude_patterns = [".*", "bench", "bindings", "build", "cpp", "dist", "docs/Doxyfile", "python", "tests", "tools"]
+html_additional_pages = {"index": "redirect.html"}
+templates_path = ["templates"]
+
+myst_heading_anchors = 4
+
+autodoc_default_options = {"members": True, "undoc-members": True}
+autodoc_member_order = "groupwise"
+autodoc_type_aliases = {name: name for name in ("Array", "ArrayLike", "Avoid", "Solver", "Index")}
+autoclass_content = "both"
+napoleon_google_docstring = False
+python_maximum_signature_line_length = 100
+python_use_unqualified_type_names = True
+
+breathe_projects = {"sigmaik": str(Path(__file__).parents[1] / "build/docs/doxygen/xml")}
+breathe_default_project = "sigmaik"
+breathe_show_include = False
+cpp_maximum_signature_line_length = 100
+suppress_warnings = ["duplicate_declaration.cpp"]  # `namespace sigmaik`, which every header opens
+
+html_theme = "furo"
+html_title = f"sigmaik {version}"
+html_show_sourcelink = False
+html_copy_source = False
+
+
+def _plain_text(app, what, name, obj, options, lines: list[str]) -> None:
+    """Keep what a docstring in plain text says, one without a section of numpydoc: code, items `name: …`, characters."""
+    if any(re.fullmatch(r"\s*-{3,}", line) for line in lines):
+        return
+    kept: list[str] = []
+    for block in re.split(r"\n\s*\n", "\n".join(lines).strip("\n")):
+        rows = block.split("\n")
+        if all(row.startswith("    ") for row in rows):
+            kept += ["::", "", *rows, ""]
+            continue
+        items: list[str] = []
+        for row in rows:
+            if items and not re.match(r"[\w, ]+(\[[^\]]*\])?:", row):
+                items[-1] += " " + row.strip()
+            else:
+                items.append(row)
+        kept += ["| " + re.sub(r"([\\`*|_])", r"\\\1", item) for item in items] + [""]
+    lines[:] = kept
+
+
+def setup(app) -> None:
+    app.connect("autodoc-process-docstring", _plain_text, priority=400)  # before napoleon
