@@ -10,7 +10,7 @@ export SKBUILD_BUILD_DIR := build/python
 export SKBUILD_CMAKE_DEFINE := SIGMAIK_WERROR=$(WERROR)
 
 .NOTPARALLEL:
-.PHONY: help demo lint test test-browser test-clang test-asan test-tsan stress bench wheel build install stubs \
+.PHONY: help demo docs lint test test-browser test-clang test-asan test-tsan stress bench wheel build install stubs \
         stubs-check clean system
 
 help:  ## this list
@@ -18,6 +18,12 @@ help:  ## this list
 
 demo: .venv/.demo .venv/.package  ## a 7-joint arm driven beyond its reach by every method: a plot and its numbers
 	$(BIN)/sigmaik reach --robot ufactory_xarm7 --path extended-line --method all --out build/demo
+
+docs: .venv/.docs .venv/.package  ## the documentation site, in build/docs/html (part of `make test`)
+	@tools/setup_system.sh $(PYTHON) doxygen
+	mkdir -p build/docs
+	doxygen docs/Doxyfile
+	$(BIN)/python -m sphinx -q -W --keep-going -c docs -d build/docs/doctrees . build/docs/html
 
 lint: .venv/.test  ## format, style, types, spelling, and what the repository says of itself
 	tools/lint.sh
@@ -27,6 +33,7 @@ test: lint build .venv/.test .venv/.package  ## everything: lint, install, stubs
 	tools/stubs.sh --check
 	ctest --test-dir build/release --output-on-failure
 	$(BIN)/python -m pytest
+	$(MAKE) docs
 	$(MAKE) test-browser
 
 test-browser: .venv/.test .venv/.package  ## the page of `sigmaik teleop` in Chromium, without a screen (part of `make test`)
@@ -78,8 +85,8 @@ build/release/build.ninja: CMakePresets.json | system
 .venv/pyvenv.cfg: | system
 	$(PYTHON) -m venv .venv
 
-# .build, .demo, .test, .bench: the packages that building, the demo, the tests and the benchmarks need.
-.venv/.build .venv/.demo .venv/.test .venv/.bench: .venv/.%: .venv/pyvenv.cfg pyproject.toml tools/requirements.py
+# .build, .demo, .docs, .test, .bench: the packages that building, the demo, the site, the tests and the benchmarks need.
+.venv/.build .venv/.demo .venv/.docs .venv/.test .venv/.bench: .venv/.%: .venv/pyvenv.cfg pyproject.toml tools/requirements.py
 	$(BIN)/python -m pip install -q $$($(BIN)/python tools/requirements.py $*)
 	@touch $@
 

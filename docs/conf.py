@@ -44,8 +44,9 @@ html_copy_source = False
 
 
 def _plain_text(app, what, name, obj, options, lines: list[str]) -> None:
-    """Keep what a docstring in plain text says, one without a section of numpydoc: code, items `name: …`, characters."""
-    if any(re.fullmatch(r"\s*-{3,}", line) for line in lines):
+    """Make reStructuredText of a docstring in plain text: code, items `name: …`, characters that mean what they are."""
+    if any(re.fullmatch(r"\s*-{3,}", line) for line in lines):  # numpydoc, which napoleon knows
+        lines[:] = [re.sub(r"(`.*?`)|\|", lambda found: found[1] or r"\|", line) for line in lines]
         return
     kept: list[str] = []
     for block in re.split(r"\n\s*\n", "\n".join(lines).strip("\n")):

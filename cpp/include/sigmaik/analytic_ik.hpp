@@ -39,18 +39,20 @@ struct AnalyticBranch {
 
 /// Answer of AnalyticIk::solve(). By value, no heap.
 struct AnalyticSolutions {
-  AnalyticStatus status = AnalyticStatus::BadInput;
-  int count = 0;                           ///< 0 to 8
-  std::array<AnalyticBranch, 8> branches;  ///< the first `count`
+  AnalyticStatus status = AnalyticStatus::BadInput;  ///< what was found
+  int count = 0;                                     ///< 0 to 8
+  std::array<AnalyticBranch, 8> branches;            ///< the first `count`
 
+  /// The postures found, for range-based loops.
   const AnalyticBranch* begin() const noexcept { return branches.data(); }
+  /// One past the last posture found.
   const AnalyticBranch* end() const noexcept { return branches.data() + count; }
 };
 
 /// Answer of AnalyticIk::nearest(). By value, no heap.
 struct AnalyticNearest {
-  AnalyticStatus status = AnalyticStatus::BadInput;
-  AnalyticBranch branch;  ///< meaningful where status is Ok
+  AnalyticStatus status = AnalyticStatus::BadInput;  ///< what was found
+  AnalyticBranch branch;                             ///< meaningful where status is Ok
 };
 
 /// Inverse kinematics by subproblems with known answers: the wrist centre gives joint 1, then joints 2 and 3 as a
@@ -94,6 +96,7 @@ class AnalyticIk {
   /// that the pose leaves free stays as in q, or at the limit that q is beyond.
   AnalyticNearest nearest(const Pose& pose, const JointRef& q) const noexcept;
 
+  /// The arm.
   const Chain& chain() const noexcept { return chain_; }
 
  private:

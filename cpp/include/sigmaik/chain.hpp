@@ -13,6 +13,7 @@
 
 namespace sigmaik {
 
+/// Kind of a joint. A continuous joint turns without position limits; its positions are the same modulo 2π.
 enum class JointType { Fixed, Revolute, Continuous, Prismatic };
 
 /// "fixed", "revolute", "continuous", "prismatic".
@@ -28,9 +29,9 @@ struct Inertia {
 /// A joint and the link that it carries. The link frame is the joint frame after the motion:
 /// parent ← origin · motion(axis, q).
 struct Segment {
-  std::string joint_name;
-  std::string link_name;
-  JointType type = JointType::Fixed;
+  std::string joint_name;                                         ///< unique in the chain
+  std::string link_name;                                          ///< unique in the chain
+  JointType type = JointType::Fixed;                              ///< kind of the joint
   Pose origin = Pose::Identity();                                 ///< joint frame in the parent link, at q = 0
   Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();                ///< in the joint frame; normalised by Chain
   double lower = -std::numeric_limits<double>::infinity();        ///< [rad or m]
@@ -44,7 +45,8 @@ struct Segment {
 
 /// Limits of the movable joints, base to tip, infinite where there is none.
 struct JointLimits {
-  JointVector lower, upper;  ///< [rad or m]
+  JointVector lower;         ///< [rad or m]
+  JointVector upper;         ///< [rad or m]
   JointVector velocity;      ///< [rad/s or m/s]
   JointVector acceleration;  ///< [rad/s² or m/s²]
   JointVector jerk;          ///< [rad/s³ or m/s³]
@@ -56,12 +58,13 @@ struct JointLimits {
 struct JointConstants {
   Eigen::Matrix3d rotation;     ///< this joint's frame in the last one's
   Eigen::Vector3d translation;  ///< [m]
-  bool prismatic;
+  bool prismatic;               ///< true: slides along z; false: turns about z
 };
 
 /// A serial arm. A value: cheap to copy (copies share one immutable model), safe to use from many threads.
 class Chain {
  public:
+  /// \param base name of the base link
   /// \param segments base to tip, fixed joints included; 1 to 16 of them movable
   /// \throws Error with the joint and the value, where a name is empty or used twice, an axis is zero, a
   ///     number is not finite or absurd, or limits contradict each other
@@ -70,19 +73,23 @@ class Chain {
   /// Reads a URDF (through urdfdom).
   /// \param source a file's path, or the XML itself
   /// \param base, tip link names; empty: the root, the only leaf
-  /// \param acceleration [rad/s² or m/s²], one a movable joint; empty: the URDF's own, where its <limit>
+  /// \param acceleration [rad/s² or m/s²], one a movable joint; empty: the URDF's own, where its `limit`
   ///     elements carry the attribute `acceleration` (our extension), else infinite
   /// \throws Error for anything that is not a usable serial arm, with the facts
   static Chain from_urdf(const std::string& source, const std::string& base = "", const std::string& tip = "",
                          const std::vector<double>& acceleration = {});
 
+  /// Number n of movable joints, 1 to 16.
   int dof() const noexcept { return model_->dof; }
+  /// Name of the base link.
   const std::string& base() const noexcept { return model_->base; }
+  /// Name of the tip link.
   const std::string& tip() const noexcept { return model_->segments.back().link_name; }
   /// Names of the movable joints, base to tip.
   const std::vector<std::string>& joint_names() const noexcept { return model_->joint_names; }
   /// Types of the movable joints, base to tip.
   const std::vector<JointType>& joint_types() const noexcept { return model_->joint_types; }
+  /// Limits of the movable joints, (n,) each.
   const JointLimits& limits() const noexcept { return model_->limits; }
   /// Everything, fixed joints included.
   const std::vector<Segment>& segments() const noexcept { return model_->segments; }
@@ -93,6 +100,7 @@ class Chain {
 
   /// Constants of the kinematics: dof() joints, then the tip's frame in the last joint's.
   const std::array<JointConstants, kMaxJoints>& constants() const noexcept { return model_->constants; }
+  /// The tip in the last movable joint's frame, at any q.
   const Pose& tool() const noexcept { return model_->tool; }
 
  private:

@@ -49,7 +49,9 @@ class ComputedTorque {
   ComputedTorqueStep update(const JointRef& q, const JointRef& qdot, const JointRef& q_desired,
                             const JointRef& qdot_desired, const JointRef& qddot_desired) noexcept;
 
+  /// Number n of movable joints.
   int dof() const noexcept { return dynamics_.dof(); }
+  /// The settings, as given.
   const ComputedTorqueOptions& options() const noexcept { return options_; }
 
  private:

@@ -27,9 +27,12 @@ class Dynamics {
   explicit Dynamics(const Chain& chain, const Eigen::Vector3d& gravity = {0.0, 0.0, -9.80665},
                     const std::optional<Inertia>& payload = std::nullopt);
   ~Dynamics();
+  /// Takes over the model of another; the other may only be destroyed or assigned to.
   Dynamics(Dynamics&&) noexcept;
+  /// Takes over the model of another; the other may only be destroyed or assigned to.
   Dynamics& operator=(Dynamics&&) noexcept;
 
+  /// Number n of movable joints.
   int dof() const noexcept;
 
   // Real time: noexcept, no heap. Arguments (n,) must have that size and be finite.

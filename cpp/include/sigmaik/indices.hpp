@@ -16,6 +16,7 @@
 
 namespace sigmaik {
 
+/// An index of a Jacobian: how far from singular it is.
 enum class Index {
   Manipulability,    ///< √det(JJᵀ) = Π σ_i (Yoshikawa 1985)
   ConditionNumber,   ///< σ_1/σ_m, 1 at best, +inf at a singularity (the dexterity index of Petrović et al., eq. 5)
@@ -31,6 +32,7 @@ const char* to_string(Index index) noexcept;
 /// λ = σ² that a metre-sized arm's largest eigenvalue of JJᵀ does not exceed: k where nothing else is known.
 inline constexpr double kDefaultScale = 6.0;
 
+/// Settings of IndexFunction.
 struct IndexOptions {
   double k = kDefaultScale;  ///< > 0, of the geometry-aware index: Σ = kI
   /// (m, m) symmetric positive definite, Σ instead of kI; empty: kI.
@@ -44,6 +46,7 @@ class IndexFunction {
   /// \throws Error where an option is out of its range or Σ is not positive definite
   explicit IndexFunction(Index index, const IndexOptions& options = {});
 
+  /// Which index.
   Index index() const noexcept { return index_; }
   /// Rows of the Jacobians that it takes; 0: any.
   int rows() const noexcept { return static_cast<int>(whiten_.rows()); }

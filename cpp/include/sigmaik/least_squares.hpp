@@ -30,19 +30,22 @@ inline constexpr int kMaxInequalities = 32;  ///< rows of G
 
 /// Bounded, so none touches the heap.
 using UnknownVector = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, kMaxUnknowns, 1>;
+/// One number a row of A, C or G, up to 32.
 using RowVector = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, kMaxObjectives, 1>;
+/// Rows of A, C or G: up to 32×24.
 using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, kMaxObjectives, kMaxUnknowns>;
 
 /// The problem. A part that is empty is absent; the number of unknowns is that of the columns of A, C or G, or the size
 /// of the bounds.
 struct LeastSquaresProblem {
-  RowMatrix A;                 ///< (m, n)
-  RowVector b;                 ///< (m,)
-  RowMatrix C;                 ///< (p, n), p ≤ 8
-  RowVector d;                 ///< (p,)
-  UnknownVector lower, upper;  ///< (n,), lower ≤ upper, infinite where there is none
-  RowMatrix G;                 ///< (k, n)
-  RowVector h;                 ///< (k,), infinite where there is none
+  RowMatrix A;          ///< (m, n)
+  RowVector b;          ///< (m,)
+  RowMatrix C;          ///< (p, n), p ≤ 8
+  RowVector d;          ///< (p,)
+  UnknownVector lower;  ///< (n,), −∞ where there is no bound
+  UnknownVector upper;  ///< (n,), at least `lower`, +∞ where there is no bound
+  RowMatrix G;          ///< (k, n)
+  RowVector h;          ///< (k,), +∞ where there is no bound
 };
 
 /// What solve() did.
@@ -56,9 +59,10 @@ enum class LeastSquaresStatus : std::int8_t {
 /// "optimal", "infeasible", "step limit", "bad input".
 const char* to_string(LeastSquaresStatus status) noexcept;
 
+/// Answer of LeastSquares::solve(). By value, no heap.
 struct LeastSquaresSolution {
-  UnknownVector x;  ///< (n,) inside the bounds exactly
-  LeastSquaresStatus status = LeastSquaresStatus::BadInput;
+  UnknownVector x;                                           ///< (n,) inside the bounds exactly
+  LeastSquaresStatus status = LeastSquaresStatus::BadInput;  ///< what solve() did
   int steps = 0;                ///< factorisations taken; 1 where the last active set still fits
   std::uint32_t at_lower = 0;   ///< bit i: the answer is held at lower[i]
   std::uint32_t at_upper = 0;   ///< bit i: the answer is held at upper[i]

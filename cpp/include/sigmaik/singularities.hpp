@@ -18,9 +18,9 @@
 
 namespace sigmaik {
 
-inline constexpr int kMaxSets = 4;       ///< most sets of an arm
-inline constexpr int kMaxResiduals = 8;  ///< most residuals of an arm, all sets together
-inline constexpr int kMaxCodimension = 2;
+inline constexpr int kMaxSets = 4;         ///< most sets of an arm
+inline constexpr int kMaxResiduals = 8;    ///< most residuals of an arm, all sets together
+inline constexpr int kMaxCodimension = 2;  ///< most equations of a set
 
 /// A singular set, described.
 struct SingularSet {
@@ -32,21 +32,24 @@ struct SingularSet {
 
 /// Height and width of the potentials φ_i = exp(η₁ − η₂ ψ_i) (eq. 26), and their weights in the sum.
 struct Potential {
-  double eta1 = 7.783224016336037;  ///< log of the height: log 2400 (table 2)
-  double eta2 = 400.0;              ///< [1/rad²] inverse squared width
-  std::array<double, kMaxSets> weights{1.0, 1.0, 1.0, 1.0};
+  double eta1 = 7.783224016336037;                           ///< log of the height: log 2400 (table 2)
+  double eta2 = 400.0;                                       ///< [1/rad²] inverse squared width
+  std::array<double, kMaxSets> weights{1.0, 1.0, 1.0, 1.0};  ///< ≥ 0, one a set: factors of the sum
 };
 
 /// An operation of a recorded expression. Operands are indices of earlier operations.
 struct Operation {
-  enum Kind { Constant, Sin, Cos, Add, Subtract, Multiply } kind;
-  int a = 0, b = 0;    ///< operands; of Sin and Cos, a is the joint
+  /// What an operation computes.
+  enum Kind { Constant, Sin, Cos, Add, Subtract, Multiply };
+  Kind kind;           ///< what is computed
+  int a = 0;           ///< first operand; of Sin and Cos, the joint
+  int b = 0;           ///< second operand
   double value = 0.0;  ///< of a Constant
 };
 /// A recorded expression: operations, and which of them are the results.
 struct Tape {
-  std::vector<Operation> operations;
-  std::vector<int> results;
+  std::vector<Operation> operations;  ///< in the order of evaluation
+  std::vector<int> results;           ///< indices of the operations whose values are the results
 };
 
 /// The known singular sets of an arm. A value, cheap to copy, safe to use from many threads. q is (n,) [rad] in the
@@ -60,10 +63,13 @@ class SingularSets {
   /// Of a chain that has the kinematics of a known arm, whatever its base, tool and names.
   static std::optional<SingularSets> of(const Chain& chain);
 
+  /// Name of the arm.
   const std::string& name() const noexcept;
+  /// Number n of movable joints.
   int dof() const noexcept;
   /// Number of sets, c.
   int size() const noexcept;
+  /// Set i.
   const SingularSet& set(int i) const noexcept;
   /// Number of residuals, the sum of all codimensions.
   int residual_count() const noexcept;
@@ -77,17 +83,21 @@ class SingularSets {
 
   /// Σ_i w_i φ_i.
   double potential(const JointRef& q, const Potential& p = {}) const noexcept;
+  /// The same, with its gradient (n,).
   double potential(const JointRef& q, const Potential& p, JointVector& gradient) const noexcept;
+  /// The same, with its gradient (n,) and Hessian (n, n).
   double potential(const JointRef& q, const Potential& p, JointVector& gradient, JointMatrix& hessian) const noexcept;
 
   /// √det(JJᵀ) in closed form, accurate down to zero.
   double manipulability(const JointRef& q) const noexcept;
   /// With its gradient, zero on a singular set, where there is none.
   double manipulability(const JointRef& q, JointVector& gradient) const noexcept;
+  /// With its gradient (n,) and Hessian (n, n), both zero on a singular set, where there is none.
   double manipulability(const JointRef& q, JointVector& gradient, JointMatrix& hessian) const noexcept;
 
-  /// The residuals as an expression in the chain's joint positions, and the terms whose squares add up to m².
+  /// The residuals as an expression in the chain's joint positions.
   Tape residual_tape() const;
+  /// The terms whose squares add up to m², as an expression in the chain's joint positions.
   Tape manipulability_tape() const;
 
   /// What is known of one arm.

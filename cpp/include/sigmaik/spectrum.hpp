@@ -23,7 +23,9 @@ class Spectrum {
   /// is one, and are otherwise the same on every machine and run. Signs continue too.
   void decompose(const TaskJacobianRef& jacobian) noexcept;
 
+  /// Number m of rows.
   int rows() const noexcept { return m_; }
+  /// Number n of columns.
   int cols() const noexcept { return n_; }
   /// Number of singular values, min(m, n).
   int size() const noexcept { return m_ < n_ ? m_ : n_; }

@@ -20,7 +20,7 @@ enum class StreamMode {
 
 /// Settings of a TargetStream.
 struct TargetStreamOptions {
-  StreamMode mode = StreamMode::Predict;
+  StreamMode mode = StreamMode::Predict;  ///< how targets are made of samples
   double max_speed = 1.5;          ///< [m/s] > 0: nothing is faster. A sample that would have to be is an outlier.
   double max_angular_speed = 4.0;  ///< [rad/s] > 0
   /// [s] ≥ 0, time constant of the way from where the target is to where a new sample says it is; at 0 the twist jumps.
@@ -46,11 +46,11 @@ enum class SampleStatus : std::int8_t {
 
 /// How many samples had which fate.
 struct SampleCounts {
-  std::int64_t accepted = 0;  ///< relocated ones included
-  std::int64_t relocated = 0;
-  std::int64_t outliers = 0;
-  std::int64_t out_of_order = 0;
-  std::int64_t invalid = 0;
+  std::int64_t accepted = 0;      ///< relocated ones included
+  std::int64_t relocated = 0;     ///< samples of SampleStatus::Relocated
+  std::int64_t outliers = 0;      ///< samples of SampleStatus::Outlier
+  std::int64_t out_of_order = 0;  ///< samples of SampleStatus::OutOfOrder
+  std::int64_t invalid = 0;       ///< samples of SampleStatus::Invalid
 };
 
 /// What a target is, ordered from the best to the worst.
@@ -68,10 +68,10 @@ const char* to_string(SampleStatus status) noexcept;
 
 /// Where to be now, and how to move: `servo.update(target.pose, target.twist)`.
 struct Target {
-  Pose pose = Pose::Identity();
-  Twist twist = Twist::Zero();  ///< derivative of the pose: [v; ω], base axes, at its origin
-  StreamStatus status = StreamStatus::Waiting;
-  double age = 0.0;  ///< [s] since the newest sample was taken; 0 before the first
+  Pose pose = Pose::Identity();                 ///< tip in base
+  Twist twist = Twist::Zero();                  ///< derivative of the pose: [v; ω], base axes, at its origin
+  StreamStatus status = StreamStatus::Waiting;  ///< what the target is made of
+  double age = 0.0;                             ///< [s] since the newest sample was taken; 0 before the first
 };
 
 /// The way from a sensor to a servo: samples come when they come, late, doubled, wrong or not at all; targets go out
@@ -116,16 +116,18 @@ class TargetStream {
   /// Real time.
   Target at(double time) noexcept;
 
+  /// The settings, as given.
   const TargetStreamOptions& options() const noexcept { return options_; }
+  /// What became of the samples since the last reset().
   const SampleCounts& counts() const noexcept { return counts_; }
 
  private:
   struct Sample {
     double time = 0.0;
-    Pose pose = Pose::Identity();
+    Pose pose = Pose::Identity();  ///< tip in base
   };
   struct Motion {
-    Pose pose = Pose::Identity();
+    Pose pose = Pose::Identity();  ///< tip in base
     Twist twist = Twist::Zero();
   };
   // Covariance of place and velocity, each times I₃.

@@ -18,11 +18,12 @@ enum class Frame {
 /// Rows (vx, vy, vz, ωx, ωy, ωz) that matter. {{1,1,1,0,0,0}}: position only. {{1,1,1,1,1,0}, Frame::Tool}: free
 /// rotation about the tool's z axis.
 struct Task {
-  std::array<bool, 6> mask{true, true, true, true, true, true};
-  Frame frame = Frame::Base;
+  std::array<bool, 6> mask{true, true, true, true, true, true};  ///< rows (vx, vy, vz, ωx, ωy, ωz) asked for
+  Frame frame = Frame::Base;                                     ///< axes that the rows are named in
 
   /// Number of rows asked for.
   int rows() const noexcept;
+  /// Whether all six rows are asked for.
   bool whole() const noexcept { return rows() == 6; }
   /// \throws Error where no row is asked for
   void validate() const;

@@ -32,7 +32,9 @@ using Pose = Eigen::Isometry3d;
 
 /// Arguments of real-time calls. A Ref to a bounded type takes vectors, blocks and rows without a heap copy.
 using JointRef = Eigen::Ref<const JointVector>;
+/// Argument: one number a task row.
 using TaskRef = Eigen::Ref<const TaskVector>;
+/// Argument: an m×n Jacobian, 1 ≤ m ≤ 6 and 1 ≤ n ≤ 16; a block of a larger matrix too.
 using TaskJacobianRef = Eigen::Ref<const TaskJacobian, 0, Eigen::OuterStride<>>;
 
 }  // namespace sigmaik

@@ -51,9 +51,13 @@ class VelocitySolver {
   /// \throws Error where a parameter is out of its range
   void set_method(const Method& method);
 
+  /// The rule.
   const Method& method() const noexcept { return method_; }
+  /// [m], the length that weighs as much as one radian.
   double length_scale() const noexcept { return length_scale_; }
+  /// The rows asked for, and their axes.
   const Task& task() const noexcept { return task_; }
+  /// Decomposition of the last solve().
   const Spectrum& spectrum() const noexcept { return spectrum_; }
 
  private:
