@@ -19,11 +19,12 @@ help:  ## this list
 demo: .venv/.demo .venv/.package  ## a 7-joint arm driven beyond its reach by every method: a plot and its numbers
 	$(BIN)/sigmaik reach --robot ufactory_xarm7 --path extended-line --method all --out build/demo
 
-docs: .venv/.docs .venv/.package  ## the documentation site, in build/docs/html (part of `make test`)
+docs: .venv/.docs .venv/.test .venv/.package  ## the documentation site, in build/docs/html (part of `make test`)
 	@tools/setup_system.sh $(PYTHON) doxygen
 	mkdir -p build/docs
 	doxygen docs/Doxyfile
 	$(BIN)/python -m sphinx -q -W --keep-going -c docs -d build/docs/doctrees . build/docs/html
+	$(BIN)/python -m pytest tests/docs
 
 lint: .venv/.test  ## format, style, types, spelling, and what the repository says of itself
 	tools/lint.sh

@@ -32,6 +32,7 @@ __all__ = [
     "reference_scale",
 ]
 Index = Literal["manipulability", "condition_number", "min_singular_value", "geometry_aware"]
+"""Name of an index."""
 
 DEFAULT_SCALE: float = _core.DEFAULT_SCALE
 """k where nothing is known of the arm: what the largest eigenvalue of JJᵀ of a metre-sized arm stays below."""

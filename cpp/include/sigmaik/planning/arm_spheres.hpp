@@ -37,8 +37,8 @@ class ArmSpheres {
   /// \throws Error where there is no sphere or too many, a segment does not exist, or a number is out of its range
   ArmSpheres(const Chain& chain, std::vector<LinkSphere> spheres);
 
-  /// Covers the boxes, cylinders and spheres of a URDF whole: each link's <collision> shapes, or where it has none its
-  /// <visual> ones. Links that fixed joints carry beside the arm are part of it, e.g. a tool behind the tip; movable
+  /// Covers the boxes, cylinders and spheres of a URDF whole: each link's `collision` shapes, or where it has none its
+  /// `visual` ones. Links that fixed joints carry beside the arm are part of it, e.g. a tool behind the tip; movable
   /// branches are not. Links with meshes get spheres as by along_links(), links without any shape none. A cylinder of
   /// radius r and length L becomes m = ⌈L/r⌉ spheres of radius √(r² + (L/2m)²), at most 1.12 r; a box small boxes, a
   /// sphere each.
