@@ -43,13 +43,12 @@ html_show_sourcelink = False
 html_copy_source = False
 
 
-def _plain_text(app, what, name, obj, options, lines: list[str]) -> None:
-    """Make reStructuredText of a docstring in plain text: code, items `name: …`, characters that mean what they are."""
-    if any(re.fullmatch(r"\s*-{3,}", line) for line in lines):  # numpydoc, which napoleon knows
-        lines[:] = [re.sub(r"(`.*?`)|\|", lambda found: found[1] or r"\|", line) for line in lines]
-        return
+def _text(app, what, name, obj, options, lines: list[str]) -> None:
+    """Make reStructuredText of a docstring: code, items `name: …`, and characters that mean what they are."""
+    begin = next((i for i, line in enumerate(lines) if re.fullmatch(r"\s*-{3,}", line)), None)
+    text = lines if begin is None else lines[: begin - 1]  # from there on it is numpydoc's, which napoleon knows
     kept: list[str] = []
-    for block in re.split(r"\n\s*\n", "\n".join(lines).strip("\n")):
+    for block in re.split(r"\n\s*\n", "\n".join(text).strip("\n")):
         rows = block.split("\n")
         if all(row.startswith("    ") for row in rows):
             kept += ["::", "", *rows, ""]
@@ -60,9 +59,26 @@ def _plain_text(app, what, name, obj, options, lines: list[str]) -> None:
                 items[-1] += " " + row.strip()
             else:
                 items.append(row)
-        kept += ["| " + re.sub(r"([\\`*|_])", r"\\\1", item) for item in items] + [""]
-    lines[:] = kept
+        kept += ["| " + _escaped(item) for item in items] + [""]
+    lines[:] = kept + ([] if begin is None else [_escaped(line) for line in lines[begin - 1 :]])
+
+
+def _escaped(line: str) -> str:
+    """With |, * and _ as they are, outside of `code`."""
+    return re.sub(r"(`+[^`]*`+)|([\\*|]|_\b)", lambda found: found[1] or "\\" + found[2], line)
+
+
+def _signature(app, what, name, obj, options, signature: str | None, returned: str | None):
+    """What a reader calls the types by; pybind11 and autodoc have longer names."""
+    if signature:
+        signature = re.sub(r"TypeAliasForwardRef\('(\w+)'\)", r"\1", signature)
+        signature = re.sub(r"typing\.SupportsFloat \| typing\.SupportsIndex", "float", signature)
+        signature = re.sub(r"typing\.SupportsInt \| typing\.SupportsIndex", "int", signature)
+        signature = re.sub(r"\(self: [\w.]+(, )?", "(", signature)
+        signature = signature.replace("numpy.typing.", "")
+    return signature, returned
 
 
 def setup(app) -> None:
-    app.connect("autodoc-process-docstring", _plain_text, priority=400)  # before napoleon
+    app.connect("autodoc-process-docstring", _text, priority=400)  # before napoleon
+    app.connect("autodoc-process-signature", _signature)
