@@ -11,7 +11,7 @@
 namespace sigmaik {
 
 /// Postures of a six-joint arm [rad].
-using SixJoints = Eigen::Matrix<double, 6, 1>;
+using SixJoints = Eigen::Matrix<double, 6, 1, kLayout>;
 
 /// What AnalyticIk found.
 enum class AnalyticStatus : std::int8_t {
