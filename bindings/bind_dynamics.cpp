@@ -1,8 +1,21 @@
 #include <sigmaik/computed_torque.hpp>
 
-#include "arguments.hpp"
+#include "fields.hpp"
 
 namespace sigmaik::bindings {
+
+template <>
+struct Fields<ComputedTorqueOptions> {
+  static constexpr std::tuple all{
+      field("frequency", &ComputedTorqueOptions::frequency,
+            "ω [rad/s] > 0 of the error's dynamics; the loop's rate should be 10 ω and more."),
+      field("damping_ratio", &ComputedTorqueOptions::damping_ratio, "ζ > 0; 1 is critical."),
+      field("gravity", &ComputedTorqueOptions::gravity, "(3,) [m/s²] in base axes, as the controller knows it."),
+      field("payload", &ComputedTorqueOptions::payload,
+            "what the controller knows of the tip's load, in the tip's frame, as for Dynamics."),
+  };
+};
+
 namespace {
 
 Eigen::Vector3d gravity_argument(const MaybeArray& gravity, const Eigen::Vector3d& otherwise) {
@@ -79,25 +92,16 @@ void bind_dynamics(py::module_& m) {
                ", torque=" + py::str(to_numpy(s.torque)).cast<std::string>() + ")";
       });
 
-  const ComputedTorqueOptions defaults;
-  py::class_<ComputedTorque>(
+  py::class_<ComputedTorque> c(
       m, "ComputedTorque",
       "Computed torque control: τ = M(q) v + C(q, q̇) q̇ + g(q), v = q̈_d + 2ζω ė + ω² e, e = q_d − q.\n\n"
       "With the true model every joint's error obeys ë + 2ζω ė + ω² e = 0 by itself (Beck et al. 2022,\n"
-      "eqs. 18 to 20). Where an effort limit of the chain would be broken, v is scaled down in all joints alike.")
-      .def(py::init([](const Chain& chain, double frequency, double damping_ratio, const MaybeArray& gravity,
-                       const std::optional<Inertia>& payload) {
-             return ComputedTorque(chain, {frequency, damping_ratio,
-                                           gravity_argument(gravity, ComputedTorqueOptions{}.gravity), payload});
-           }),
-           py::arg("chain"), py::kw_only(), py::arg("frequency") = defaults.frequency,
-           py::arg("damping_ratio") = defaults.damping_ratio, py::arg("gravity") = py::none(),
-           py::arg("payload") = py::none(),
-           "frequency: ω [rad/s] > 0; the loop's rate should be 10 ω and more.\n"
-           "damping_ratio: ζ > 0; 1 is critical.\n"
-           "gravity, payload: what the controller knows of them, as for Dynamics.\n\n"
-           "Raises Error where an option is out of its range, and where Dynamics does.")
-      .def_property_readonly("dof", &ComputedTorque::dof, "Number of movable joints, n.")
+      "eqs. 18 to 20). Where an effort limit of the chain would be broken, v is scaled down in all joints alike.");
+  def_init<ComputedTorqueOptions>(
+      c, std::tuple{parameter<Chain>("chain")}, 0,
+      "Raises Error where an option is out of its range, and where Dynamics does.",
+      [](const Chain& chain, const ComputedTorqueOptions& options) { return ComputedTorque(chain, options); });
+  c.def_property_readonly("dof", &ComputedTorque::dof, "Number of movable joints, n.")
       .def(
           "update",
           [](ComputedTorque& c, const ArrayLike& q, const ArrayLike& qdot, const ArrayLike& q_desired,

@@ -1,20 +1,7 @@
-#include "arguments.hpp"
+#include "servo_options.hpp"
 
 namespace sigmaik::bindings {
 namespace {
-
-OnLimit on_limit_argument(const std::string& text) {
-  if (text == "redistribute") return OnLimit::Redistribute;
-  if (text == "scale") return OnLimit::Scale;
-  throw Error("on_limit = '" + text + "' must be 'redistribute' or 'scale'");
-}
-
-Avoid avoid_argument(const std::optional<std::string>& text) {
-  if (!text) return Avoid::None;
-  if (*text == "manipulability") return Avoid::Manipulability;
-  if (*text == "potential") return Avoid::Potential;
-  throw Error("avoid = '" + *text + "' must be None, 'manipulability' or 'potential'");
-}
 
 // Python gets an exception where C++ gets a status; the servo keeps its state and holds.
 void require_started(const Servo& servo) {
@@ -66,86 +53,25 @@ void bind_servo(py::module_& m) {
                ", qdot=" + py::str(to_numpy(s.qdot)).cast<std::string>() + ")";
       });
 
-  py::class_<Servo>(
+  py::class_<Servo> c(
       m, "Servo",
       "Drives a chain's reference configuration towards poses, or along twists, one cycle a call.\n\n"
       "It integrates its own command (q ← q + q̇ dt) and reads no measured positions. Every command holds\n"
-      "the chain's limits and leaves room to go on holding them; a start outside them comes back.")
-      .def(
-          py::init([](const Chain& chain, const Method& method, double dt, double gain_linear, double gain_angular,
-                      double max_linear_error, double max_angular_error, double soft_start, const MaybeArray& posture,
-                      double posture_gain, double posture_max_speed, const std::optional<std::string>& avoid,
-                      double avoid_gain, double avoid_max_speed, double eta1, double eta2, bool position_limits,
-                      bool velocity_limits, bool acceleration_limits, bool jerk_limits, double recovery_speed,
-                      const std::string& on_limit, const MaybeArray& exact, double length_scale, const MaybeArray& mask,
-                      const std::string& frame) {
-            ServoOptions options;
-            options.dt = dt;
-            options.gain_linear = gain_linear;
-            options.gain_angular = gain_angular;
-            options.max_linear_error = max_linear_error;
-            options.max_angular_error = max_angular_error;
-            options.soft_start = soft_start;
-            options.posture = optional_joint_argument(object_of(posture), "posture", chain.dof());
-            options.posture_gain = posture_gain;
-            options.posture_max_speed = posture_max_speed;
-            options.avoid.what = avoid_argument(avoid);
-            options.avoid.gain = avoid_gain;
-            options.avoid.max_speed = avoid_max_speed;
-            options.avoid.potential.eta1 = eta1;
-            options.avoid.potential.eta2 = eta2;
-            options.position_limits = position_limits;
-            options.velocity_limits = velocity_limits;
-            options.acceleration_limits = acceleration_limits;
-            options.jerk_limits = jerk_limits;
-            options.recovery_speed = recovery_speed;
-            if (exact) options.exact = rows_argument(*exact, "exact");
-            options.on_limit = on_limit_argument(on_limit);
-            options.length_scale = length_scale;
-            options.task = task_argument(object_of(mask), frame);
-            return Servo(chain, method, options);
-          }),
-          py::arg("chain"), py::arg("method"), py::arg("dt") = 1e-3, py::kw_only(),
-          py::arg("gain_linear") = ServoOptions{}.gain_linear, py::arg("gain_angular") = ServoOptions{}.gain_angular,
-          py::arg("max_linear_error") = ServoOptions{}.max_linear_error,
-          py::arg("max_angular_error") = ServoOptions{}.max_angular_error,
-          py::arg("soft_start") = ServoOptions{}.soft_start, py::arg("posture") = py::none(),
-          py::arg("posture_gain") = ServoOptions{}.posture_gain,
-          py::arg("posture_max_speed") = ServoOptions{}.posture_max_speed, py::arg("avoid") = py::none(),
-          py::arg("avoid_gain") = AvoidanceOptions{}.gain, py::arg("avoid_max_speed") = AvoidanceOptions{}.max_speed,
-          py::arg("eta1") = AvoidanceOptions{}.potential.eta1, py::arg("eta2") = AvoidanceOptions{}.potential.eta2,
-          py::arg("position_limits") = true, py::arg("velocity_limits") = true, py::arg("acceleration_limits") = true,
-          py::arg("jerk_limits") = true, py::arg("recovery_speed") = ServoOptions{}.recovery_speed,
-          py::arg("on_limit") = "redistribute", py::arg("exact") = py::none(), py::arg("length_scale") = 1.0,
-          py::arg("mask") = py::none(), py::arg("frame") = "base",
-          "dt: [s] from one update to the next.\n"
-          "gain_linear, gain_angular: [1/s] from pose error to twist.\n"
-          "max_linear_error [m], max_angular_error [rad]: longer errors are shortened to it.\n"
-          "soft_start: [s] over which a pose target's command is faded in after reset(); twists only where reset()\n"
-          "    was told that the arm moves.\n"
-          "posture: (n,) nominal positions, by default those given to reset(); posture_gain [1/s];\n"
-          "posture_max_speed [rad/s or m/s] caps each joint.\n"
-          "avoid: adds avoid_gain times the gradient of the manipulability ('manipulability'), or minus that of the\n"
-          "    potentials Σ exp(eta1 − eta2 ψ_i) around the known singular sets ('potential'), to the posture's "
-          "velocity,\n"
-          "    shortened to avoid_max_speed of the fastest joint: a redundant arm keeps away from singularities.\n"
-          "position_limits, …: which of the chain's limits are held, now and so that they can be held for ever.\n"
-          "recovery_speed: in (0, 1], of the velocity limit, least speed of a joint that starts outside its position\n"
-          "    limits on its way back.\n"
-          "on_limit: what gives way. 'redistribute': other joints take over, for the nearest twist that limits allow;\n"
-          "    'scale': direction kept, speed given up.\n"
-          "exact: (6,) truth values: rows (vx, vy, vz, ωx, ωy, ωz) that come before the others when redistributing.\n"
-          "length_scale, mask, frame: as for VelocitySolver.")
-      .def(
-          "reset",
-          [](Servo& s, const ArrayLike& q, const MaybeArray& qdot) {
-            s.reset(joint_argument(q, "q", s.chain().dof()),
-                    optional_joint_argument(object_of(qdot), "qdot", s.chain().dof()));
-          },
-          py::arg("q"), py::arg("qdot") = py::none(),
-          "Starts, or starts again, at q (n,): forgets all history, and pins the posture there unless one was "
-          "given.\n\n"
-          "qdot: (n,) how the arm moves now, from which the command is faded; None: it stands.")
+      "the chain's limits and leaves room to go on holding them; a start outside them comes back.");
+  def_init<ServoOptions>(c, std::tuple{parameter<Chain>("chain"), parameter<Method>("method")}, 1, "",
+                         [](const Chain& chain, const Method& method, const ServoOptions& options) {
+                           return Servo(chain, method, options);
+                         });
+  c.def(
+       "reset",
+       [](Servo& s, const ArrayLike& q, const MaybeArray& qdot) {
+         s.reset(joint_argument(q, "q", s.chain().dof()),
+                 optional_joint_argument(object_of(qdot), "qdot", s.chain().dof()));
+       },
+       py::arg("q"), py::arg("qdot") = py::none(),
+       "Starts, or starts again, at q (n,): forgets all history, and pins the posture there unless one was "
+       "given.\n\n"
+       "qdot: (n,) how the arm moves now, from which the command is faded; None: it stands.")
       .def(
           "update",
           [](Servo& s, const py::object& target, const MaybeArray& feedforward) {

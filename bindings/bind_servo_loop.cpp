@@ -8,9 +8,18 @@
 
 #include <sigmaik/servo_loop.hpp>
 
-#include "arguments.hpp"
+#include "fields.hpp"
 
 namespace sigmaik::bindings {
+
+template <>
+struct Fields<ServoLoopOptions> {
+  static constexpr std::tuple all{
+      field("history", &ServoLoopOptions::history, "samples kept for read(), a power of 2."),
+      field("priority", &ServoLoopOptions::priority, "of SCHED_FIFO, 1 to 99; 0 is the ordinary scheduler."),
+  };
+};
+
 namespace {
 
 // Writes one sample's fields into a record, in the order in which dtype() names them.
@@ -121,21 +130,17 @@ void bind_servo_loop(py::module_& m) {
       .def_readonly("elapsed", &LoopStatistics::elapsed, "[s] since start(), or from start() to stop().")
       .def_property_readonly("rate", &LoopStatistics::rate, "[Hz] cycles a second.");
 
-  py::class_<ServoLoop>(
+  py::class_<ServoLoop> c(
       m, "ServoLoop",
       "A servo in a thread of its own, at its own rate, whatever Python does meanwhile.\n\n"
       "Commands hold until they are stale: an arm whose commander hangs, or is gone, stops by itself, within its\n"
-      "limits. Late cycles are counted and left out, never made up for by a burst.")
-      .def(py::init([](const Servo& servo, int history, int priority) {
-             return std::make_unique<ServoLoop>(servo, ServoLoop::Sink{}, ServoLoopOptions{history, priority});
-           }),
-           py::arg("servo"), py::kw_only(), py::arg("history") = ServoLoopOptions{}.history,
-           py::arg("priority") = ServoLoopOptions{}.priority,
-           "servo: has started (reset); it is copied.\n"
-           "history: samples kept for read(), a power of 2.\n"
-           "priority: of SCHED_FIFO, 1 to 99; 0 is the ordinary scheduler.")
-      .def("start", &ServoLoop::start,
-           "Starts the thread. Raises Error where it runs already, or the system refuses the priority.")
+      "limits. Late cycles are counted and left out, never made up for by a burst.");
+  def_init<ServoLoopOptions>(c, std::tuple{parameter<Servo>("servo", "has started (reset); it is copied.")}, 0, "",
+                             [](const Servo& servo, const ServoLoopOptions& options) {
+                               return std::make_unique<ServoLoop>(servo, ServoLoop::Sink{}, options);
+                             });
+  c.def("start", &ServoLoop::start,
+        "Starts the thread. Raises Error where it runs already, or the system refuses the priority.")
       .def("stop", &ServoLoop::stop, py::call_guard<py::gil_scoped_release>(),
            "Brings the arm to rest, in a second at most, and ends the thread.")
       .def_property_readonly("running", &ServoLoop::running)

@@ -1,16 +1,43 @@
 #include <pybind11/native_enum.h>
 
-#include "arguments.hpp"
+#include "fields.hpp"
 
 namespace sigmaik::bindings {
-namespace {
 
-StreamMode mode_argument(const std::string& text) {
-  if (text == "hold") return StreamMode::Hold;
-  if (text == "interpolate") return StreamMode::Interpolate;
-  if (text == "predict") return StreamMode::Predict;
-  throw Error("mode = '" + text + "' must be 'hold', 'interpolate' or 'predict'");
-}
+template <>
+struct Words<StreamMode> {
+  static constexpr std::array all{Word<StreamMode>{"hold", StreamMode::Hold},
+                                  Word<StreamMode>{"interpolate", StreamMode::Interpolate},
+                                  Word<StreamMode>{"predict", StreamMode::Predict}};
+};
+
+template <>
+struct Fields<TargetStreamOptions> {
+  using O = TargetStreamOptions;
+  static constexpr std::tuple all{
+      field("mode", &O::mode,
+            "where the target is between samples, and after the last one. 'hold': at the last sample, for devices that "
+            "send only changes; 'interpolate': on a smooth curve through the samples, `latency` ago; 'predict': where "
+            "a constant-velocity Kalman filter expects it now."),
+      field("max_speed", &O::max_speed, "[m/s] > 0: nothing is faster; a sample that would have to be is an outlier."),
+      field("max_angular_speed", &O::max_angular_speed, "[rad/s] > 0, likewise."),
+      field("smoothing", &O::smoothing,
+            "[s] ≥ 0, time constant of the way from where the target is to where a new sample says it is; at 0 the "
+            "twist jumps."),
+      field("latency", &O::latency,
+            "[s] ≥ 0: 'interpolate' plays so late: the sensor's delay, and one or two samples."),
+      field("horizon", &O::horizon, "[s] ≥ 0: so long after its last sample the target moves on as it did, …"),
+      field("timeout", &O::timeout, "[s] ≥ horizon, > 0: … and by then it has come to rest, and the stream is stale."),
+      field("noise_linear", &O::noise_linear, "[m] > 0, standard deviation of a sample, each axis."),
+      field("noise_angular", &O::noise_angular, "[rad] > 0, likewise."),
+      field("acceleration_linear", &O::acceleration_linear,
+            "[m/s²] > 0, standard deviation of what the target may do between samples."),
+      field("acceleration_angular", &O::acceleration_angular, "[rad/s²] > 0, likewise."),
+      field("relocate", &O::relocate, "≥ 1: so many refused samples in a row that agree with each other are believed."),
+  };
+};
+
+namespace {
 
 double time_argument(double time) {
   if (!std::isfinite(time)) throw Error("time is not finite");
@@ -61,7 +88,7 @@ void bind_target_stream(py::module_& m) {
                ", age=" + py::str(py::float_(t.age)).cast<std::string>() + ")";
       });
 
-  py::class_<TargetStream>(
+  py::class_<TargetStream> c(
       m, "TargetStream",
       "The way from a sensor to a servo: stamped samples of a pose in, one smooth target a cycle out.\n\n"
       "    stream.push(stamp, pose)                     # whenever there is one: stamp = when it was taken\n"
@@ -71,64 +98,22 @@ void bind_target_stream(py::module_& m) {
       "faster\n"
       "than max_speed and max_angular_speed: not when a sample arrives, not when the stream stops or starts again, "
       "not\n"
-      "when the target is found elsewhere.")
-      .def(py::init([](const std::string& mode, double max_speed, double max_angular_speed, double smoothing,
-                       double latency, double horizon, double timeout, double noise_linear, double noise_angular,
-                       double acceleration_linear, double acceleration_angular, int relocate) {
-             TargetStreamOptions options;
-             options.mode = mode_argument(mode);
-             options.max_speed = max_speed;
-             options.max_angular_speed = max_angular_speed;
-             options.smoothing = smoothing;
-             options.latency = latency;
-             options.horizon = horizon;
-             options.timeout = timeout;
-             options.noise_linear = noise_linear;
-             options.noise_angular = noise_angular;
-             options.acceleration_linear = acceleration_linear;
-             options.acceleration_angular = acceleration_angular;
-             options.relocate = relocate;
-             return TargetStream(options);
-           }),
-           py::arg("mode") = "predict", py::kw_only(), py::arg("max_speed") = TargetStreamOptions{}.max_speed,
-           py::arg("max_angular_speed") = TargetStreamOptions{}.max_angular_speed,
-           py::arg("smoothing") = TargetStreamOptions{}.smoothing, py::arg("latency") = TargetStreamOptions{}.latency,
-           py::arg("horizon") = TargetStreamOptions{}.horizon, py::arg("timeout") = TargetStreamOptions{}.timeout,
-           py::arg("noise_linear") = TargetStreamOptions{}.noise_linear,
-           py::arg("noise_angular") = TargetStreamOptions{}.noise_angular,
-           py::arg("acceleration_linear") = TargetStreamOptions{}.acceleration_linear,
-           py::arg("acceleration_angular") = TargetStreamOptions{}.acceleration_angular,
-           py::arg("relocate") = TargetStreamOptions{}.relocate,
-           "mode: where the target is between samples, and after the last one. 'hold': at the last sample, for devices "
-           "that\n"
-           "    send only changes; 'interpolate': on a smooth curve through the samples, `latency` ago; 'predict': "
-           "where a\n"
-           "    constant-velocity Kalman filter expects it now.\n"
-           "max_speed [m/s], max_angular_speed [rad/s]: nothing is faster; a sample that would have to be is an "
-           "outlier.\n"
-           "smoothing: [s] time constant of the way from where the target is to where a new sample says it is; at 0 "
-           "the\n"
-           "    twist jumps.\n"
-           "latency: [s] 'interpolate' plays so late: the sensor's delay, and one or two samples.\n"
-           "horizon, timeout: [s] so long after its last sample the target moves on as it did, and by then it has come "
-           "to\n"
-           "    rest, and the stream is stale.\n"
-           "noise_linear [m], noise_angular [rad]: standard deviation of a sample, each axis.\n"
-           "acceleration_linear [m/s²], acceleration_angular [rad/s²]: of what the target may do between samples.\n"
-           "relocate: so many refused samples in a row that agree with each other are believed.")
-      .def(
-          "reset",
-          [](TargetStream& s, const py::object& start) {
-            if (start.is_none()) {
-              s.reset();
-            } else {
-              s.reset(pose_argument(start, "start"));
-            }
-          },
-          py::arg("start") = py::none(),
-          "Forgets everything. The next target is at `start` (4, 4), such as the tip's pose, and goes to the samples "
-          "from\n"
-          "there; with None it is where the first sample is.")
+      "when the target is found elsewhere.");
+  def_init<TargetStreamOptions>(c, std::tuple{}, 1, "",
+                                [](const TargetStreamOptions& options) { return TargetStream(options); });
+  c.def(
+       "reset",
+       [](TargetStream& s, const py::object& start) {
+         if (start.is_none()) {
+           s.reset();
+         } else {
+           s.reset(pose_argument(start, "start"));
+         }
+       },
+       py::arg("start") = py::none(),
+       "Forgets everything. The next target is at `start` (4, 4), such as the tip's pose, and goes to the samples "
+       "from\n"
+       "there; with None it is where the first sample is.")
       .def(
           "push",
           [](TargetStream& s, double time, const py::object& pose) {

@@ -1,12 +1,15 @@
 #include <pybind11/native_enum.h>
 
-#include "arguments.hpp"
+#include "fields.hpp"
 
 namespace sigmaik::bindings {
 
 void bind_status(py::module_& m) {
   py::register_exception<Error>(m, "Error", PyExc_ValueError)
       .attr("__doc__") = "What set-up and checked calls refuse. The text carries the facts.";
+  py::register_exception<ArgumentError>(m, "ArgumentError",
+                                        py::make_tuple(m.attr("Error"), py::handle(PyExc_TypeError)))
+      .attr("__doc__") = "An argument that a call does not have, or lacks, or that is of a wrong type.";
   py::native_enum<Status>(m, "Status", "enum.IntEnum",
                           "What a call did, ordered from the best to the worst. Degraded is not failed: everything "
                           "below BAD_INPUT is finite, inside the stated bound, and may be sent to the arm.")

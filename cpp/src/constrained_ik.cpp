@@ -7,7 +7,6 @@
 #include <sigmaik/pose.hpp>
 
 #include "length.hpp"
-#include "limit_options.hpp"
 #include "message.hpp"
 
 namespace sigmaik {
@@ -42,7 +41,7 @@ bool agrees(const AnalyticIk& analytic, const Pose& target, const LimitTracker& 
             const JointVector& qdot) noexcept {
   const AnalyticNearest nearest = analytic.nearest(target, tracker.q());
   if (nearest.status != AnalyticStatus::Ok) return false;
-  const JointVector apart = (nearest.branch.q - tracker.q()) / tracker.options().dt - qdot;
+  const JointVector apart = (nearest.branch.q - tracker.q()) / tracker.dt() - qdot;
   const VelocityBounds& bounds = tracker.bounds();
   return (apart.array().abs() <= kAgree * (bounds.upper - bounds.lower).array()).all();
 }
@@ -56,7 +55,7 @@ ConstrainedIk::ConstrainedIk(Chain chain, const ConstrainedIkOptions& options)
       options_(options),
       approximate_(part(options, false)),
       exact_(part(options, true)),
-      tracker_(chain_.limits(), detail::limit_options(options)) {
+      tracker_(chain_.limits(), options.dt, options.limits) {
   options.task.validate();
   static constexpr const char* kRows[6] = {"vx", "vy", "vz", "ωx", "ωy", "ωz"};
   for (std::size_t i = 0; i < 6; ++i) {

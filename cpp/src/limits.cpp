@@ -228,9 +228,8 @@ const char* to_string(LimitKind kind) noexcept {
   return "unknown";
 }
 
-LimitTracker::LimitTracker(const JointLimits& limits, const LimitOptions& options)
-    : options_(options), per_dt_(1.0 / options.dt), n_(static_cast<int>(limits.lower.size())) {
-  const double dt = options.dt;
+LimitTracker::LimitTracker(const JointLimits& limits, double dt, const LimitOptions& options)
+    : options_(options), dt_(dt), per_dt_(1.0 / dt), n_(static_cast<int>(limits.lower.size())) {
   require(dt > 0.0 && std::isfinite(dt), "dt = ", dt, " s must be above 0 and finite");
   require(options.recovery_speed > 0.0 && options.recovery_speed <= 1.0, "recovery_speed = ", options.recovery_speed,
           " must be above 0 and at most 1");
@@ -288,8 +287,7 @@ void LimitTracker::clear() noexcept {
 
 void LimitTracker::continue_from(const LimitTracker& other) {
   require(other.n_ == n_, "the other tracker has ", other.n_, " joints, this one ", n_);
-  require(other.options_.dt == options_.dt, "the other tracker has dt = ", other.options_.dt, " s, this one ",
-          options_.dt);
+  require(other.dt_ == dt_, "the other tracker has dt = ", other.dt_, " s, this one ", dt_);
   if (other.q_.size() == 0) return;
   clear();
   q_ = other.q_;
@@ -340,7 +338,7 @@ bool LimitTracker::move(JointVector& qdot) noexcept {
     }
   }
   const Block from = q;
-  q += options_.dt * v;
+  q += dt_ * v;
   last = v;
   if ((q > upper_.template head<kPadded>()).any() || (q < lower_.template head<kPadded>()).any()) {
     for (int i = 0; i < n_; ++i) {
@@ -396,7 +394,7 @@ void LimitTracker::update() noexcept {
 // one that takes it back to the limit, where that is behind it.
 double LimitTracker::towards(const Joint& joint, double room) const noexcept {
   if (room >= 0.0) return fastest_before(room, joint.braking);
-  const double recovery = joint.recovery < kInfinity ? joint.recovery : std::max(-room * options_.dt, 1e-3) / 0.1;
+  const double recovery = joint.recovery < kInfinity ? joint.recovery : std::max(-room * dt_, 1e-3) / 0.1;
   return -std::min(fastest_before(-room, joint.braking), recovery);
 }
 
@@ -464,7 +462,7 @@ void LimitTracker::bound(int i) noexcept {
 
 void LimitTracker::bound_with_jerk(int i) noexcept {
   Joint& joint = joints_[static_cast<std::size_t>(i)];
-  const double dt = options_.dt, above = (joint.upper - q_[i]) * per_dt_, below = (q_[i] - joint.lower) * per_dt_;
+  const double dt = dt_, above = (joint.upper - q_[i]) * per_dt_, below = (q_[i] - joint.lower) * per_dt_;
   Stop(v_[i], joint.slope, joint.jerk, joint.braking).sample(1.0, joint.next, joint.next_slope);
   const double slack = kTolerance * (1.0 + std::abs(q_[i])) * per_dt_;
   const double outside = std::max({0.0, -above, -below}) * dt;

@@ -10,7 +10,6 @@
 
 #include "finite.hpp"
 #include "length.hpp"
-#include "limit_options.hpp"
 #include "message.hpp"
 
 namespace sigmaik {
@@ -123,7 +122,7 @@ Servo::Servo(Chain chain, const Method& method, const ServoOptions& options)
       exact_{options.exact, options.task.frame},
       solver_(method, options.length_scale, options.task),
       avoidance_(chain_, options.avoid),
-      tracker_(chain_.limits(), detail::limit_options(options)) {
+      tracker_(chain_.limits(), options.dt, options.limits) {
   check_finite("gain_linear", options.gain_linear, true, "1/s");
   check_finite("gain_angular", options.gain_angular, true, "1/s");
   check("max_linear_error", options.max_linear_error, false, "m");

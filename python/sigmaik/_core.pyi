@@ -7,10 +7,14 @@ import enum
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['AdaptiveDampedLeastSquares', 'AnalyticBranch', 'AnalyticIk', 'ArmSpheres', 'CartError', 'CartLaw', 'CartRegion', 'Chain', 'ComputedTorque', 'ComputedTorqueStep', 'ConstrainedIk', 'ConstrainedIkStep', 'DEFAULT_SCALE', 'DampedLeastSquares', 'DistanceField', 'Dynamics', 'Error', 'Inertia', 'JParse', 'JacobianProjection', 'JacobianSafety', 'JacobianSafetyProjection', 'JointCost', 'JointLimits', 'LeastSquaresSolution', 'LoopCommand', 'LoopStatistics', 'PlaneCartLaw', 'PseudoInverse', 'SampleCounts', 'SampleStatus', 'Segment', 'SelectivelyDampedLeastSquares', 'Servo', 'ServoLoop', 'ServoStep', 'SingularSets', 'Solution', 'Spectrum', 'Status', 'StreamStatus', 'SupportPlanner', 'SupportStates', 'Target', 'TargetStream', 'TimeOptimal', 'TimeOptimalResult', 'VelocitySolver', 'cart_descent', 'cart_law', 'collision_cost', 'evaluate_index', 'forbidden_intervals', 'geometry_aware_cost', 'index_of_jacobian', 'joint_limit_cost', 'known_singular_sets', 'least_squares', 'load_singular_sets', 'log_manipulability_cost', 'manipulability_cost', 'min_distance', 'plane_cart_law', 'pose_error', 'potential_cost', 'reference_scale', 'rotation_exp', 'rotation_log', 'self_collision_cost', 'self_collision_pairs', 'singular_sets_of', 'solve_batch', 'spline_velocities', 'sum_of_costs', 'taut_string']
+__all__: list[str] = ['AdaptiveDampedLeastSquares', 'AnalyticBranch', 'AnalyticIk', 'ArgumentError', 'ArmSpheres', 'CartError', 'CartLaw', 'CartRegion', 'Chain', 'ComputedTorque', 'ComputedTorqueStep', 'ConstrainedIk', 'ConstrainedIkStep', 'DEFAULT_SCALE', 'DampedLeastSquares', 'DistanceField', 'Dynamics', 'Error', 'Inertia', 'JParse', 'JacobianProjection', 'JacobianSafety', 'JacobianSafetyProjection', 'JointCost', 'JointLimits', 'LeastSquaresSolution', 'LoopCommand', 'LoopStatistics', 'PlaneCartLaw', 'PseudoInverse', 'SampleCounts', 'SampleStatus', 'Segment', 'SelectivelyDampedLeastSquares', 'Servo', 'ServoLoop', 'ServoStep', 'SingularSets', 'Solution', 'Spectrum', 'Status', 'StreamStatus', 'SupportPlanner', 'SupportStates', 'Target', 'TargetStream', 'TimeOptimal', 'TimeOptimalResult', 'VelocitySolver', 'cart_descent', 'cart_law', 'collision_cost', 'evaluate_index', 'forbidden_intervals', 'geometry_aware_cost', 'index_of_jacobian', 'joint_limit_cost', 'known_singular_sets', 'least_squares', 'load_singular_sets', 'log_manipulability_cost', 'manipulability_cost', 'min_distance', 'plane_cart_law', 'pose_error', 'potential_cost', 'reference_scale', 'rotation_exp', 'rotation_log', 'self_collision_cost', 'self_collision_pairs', 'singular_sets_of', 'solve_batch', 'spline_velocities', 'sum_of_costs', 'taut_string']
 class Error(ValueError):
     """
     What set-up and checked calls refuse. The text carries the facts.
+    """
+class ArgumentError(Error, TypeError):
+    """
+    An argument that a call does not have, or lacks, or that is of a wrong type.
     """
 class Status(enum.IntEnum):
     """
@@ -627,25 +631,40 @@ class Servo:
     It integrates its own command (q ← q + q̇ dt) and reads no measured positions. Every command holds
     the chain's limits and leaves room to go on holding them; a start outside them comes back.
     """
-    def __init__(self, chain: Chain, method: PseudoInverse | DampedLeastSquares | AdaptiveDampedLeastSquares | SelectivelyDampedLeastSquares | JParse | JacobianProjection | JacobianSafety | JacobianSafetyProjection, dt: typing.SupportsFloat | typing.SupportsIndex = 0.001, *, gain_linear: typing.SupportsFloat | typing.SupportsIndex = 5.0, gain_angular: typing.SupportsFloat | typing.SupportsIndex = 5.0, max_linear_error: typing.SupportsFloat | typing.SupportsIndex = 0.25, max_angular_error: typing.SupportsFloat | typing.SupportsIndex = 1.0, soft_start: typing.SupportsFloat | typing.SupportsIndex = 0.1, posture: numpy.typing.ArrayLike | None = None, posture_gain: typing.SupportsFloat | typing.SupportsIndex = 0.0, posture_max_speed: typing.SupportsFloat | typing.SupportsIndex = ..., avoid: str | None = None, avoid_gain: typing.SupportsFloat | typing.SupportsIndex = 1.0, avoid_max_speed: typing.SupportsFloat | typing.SupportsIndex = 0.5, eta1: typing.SupportsFloat | typing.SupportsIndex = 0.0, eta2: typing.SupportsFloat | typing.SupportsIndex = 10.0, position_limits: bool = True, velocity_limits: bool = True, acceleration_limits: bool = True, jerk_limits: bool = True, recovery_speed: typing.SupportsFloat | typing.SupportsIndex = 0.1, on_limit: str = 'redistribute', exact: numpy.typing.ArrayLike | None = None, length_scale: typing.SupportsFloat | typing.SupportsIndex = 1.0, mask: numpy.typing.ArrayLike | None = None, frame: str = 'base') -> None:
+    def __init__(self, chain: Chain, method: PseudoInverse | DampedLeastSquares | AdaptiveDampedLeastSquares | SelectivelyDampedLeastSquares | JParse | JacobianProjection | JacobianSafety | JacobianSafetyProjection, dt: typing.SupportsFloat | typing.SupportsIndex = 0.001, *, gain_linear: typing.SupportsFloat | typing.SupportsIndex = 5.0, gain_angular: typing.SupportsFloat | typing.SupportsIndex = 5.0, max_linear_error: typing.SupportsFloat | typing.SupportsIndex = 0.25, max_angular_error: typing.SupportsFloat | typing.SupportsIndex = 1.0, soft_start: typing.SupportsFloat | typing.SupportsIndex = 0.1, posture: numpy.typing.ArrayLike | None = None, posture_gain: typing.SupportsFloat | typing.SupportsIndex = 0.0, posture_max_speed: typing.SupportsFloat | typing.SupportsIndex = ..., avoid: typing.Literal['manipulability', 'potential'] | None = None, avoid_gain: typing.SupportsFloat | typing.SupportsIndex = 1.0, avoid_max_speed: typing.SupportsFloat | typing.SupportsIndex = 0.5, eta1: typing.SupportsFloat | typing.SupportsIndex = 0.0, eta2: typing.SupportsFloat | typing.SupportsIndex = 10.0, position_limits: bool = True, velocity_limits: bool = True, acceleration_limits: bool = True, jerk_limits: bool = True, recovery_speed: typing.SupportsFloat | typing.SupportsIndex = 0.1, on_limit: typing.Literal['redistribute', 'scale'] = 'redistribute', exact: numpy.typing.ArrayLike | None = (0, 0, 0, 0, 0, 0), length_scale: typing.SupportsFloat | typing.SupportsIndex = 1.0, mask: numpy.typing.ArrayLike | None = (1, 1, 1, 1, 1, 1), frame: typing.Literal['base', 'tool'] = 'base') -> None:
         """
-        dt: [s] from one update to the next.
-        gain_linear, gain_angular: [1/s] from pose error to twist.
-        max_linear_error [m], max_angular_error [rad]: longer errors are shortened to it.
-        soft_start: [s] over which a pose target's command is faded in after reset(); twists only where reset()
-            was told that the arm moves.
-        posture: (n,) nominal positions, by default those given to reset(); posture_gain [1/s];
-        posture_max_speed [rad/s or m/s] caps each joint.
-        avoid: adds avoid_gain times the gradient of the manipulability ('manipulability'), or minus that of the
-            potentials Σ exp(eta1 − eta2 ψ_i) around the known singular sets ('potential'), to the posture's velocity,
-            shortened to avoid_max_speed of the fastest joint: a redundant arm keeps away from singularities.
-        position_limits, …: which of the chain's limits are held, now and so that they can be held for ever.
-        recovery_speed: in (0, 1], of the velocity limit, least speed of a joint that starts outside its position
-            limits on its way back.
-        on_limit: what gives way. 'redistribute': other joints take over, for the nearest twist that limits allow;
-            'scale': direction kept, speed given up.
-        exact: (6,) truth values: rows (vx, vy, vz, ωx, ωy, ωz) that come before the others when redistributing.
-        length_scale, mask, frame: as for VelocitySolver.
+        dt: [s] > 0, from one update to the next.
+        gain_linear: [1/s] ≥ 0, from position error to velocity. (JParse's gain_linear is another thing: the
+            paper's K.)
+        gain_angular: [1/s] ≥ 0, from orientation error to angular velocity.
+        max_linear_error: [m] > 0: longer position errors are shortened to it.
+        max_angular_error: [rad] > 0: longer orientation errors are shortened to it.
+        soft_start: [s] ≥ 0 over which a pose target's command is faded in after reset(); twists only where
+            reset() was told that the arm moves.
+        posture: (n,) nominal positions [rad or m]; None: those given to reset().
+        posture_gain: [1/s] ≥ 0, from the way to the posture to joint velocity.
+        posture_max_speed: [rad/s or m/s] > 0, cap on each joint's.
+        avoid: what keeps a redundant arm away from singularities: the gradient of the manipulability, or
+            minus that of the potentials Σ exp(eta1 − eta2 ψ_i) around the known singular sets, is added to
+            the posture's velocity.
+        avoid_gain: ≥ 0, by which that gradient is multiplied.
+        avoid_max_speed: [rad/s or m/s] > 0, of the fastest joint: longer velocities are shortened to it.
+        eta1: of the potentials, at most 100.
+        eta2: of the potentials, > 0.
+        position_limits: whether the chain's position limits are held, now and so that they can be held for
+            ever.
+        velocity_limits: the same for its velocity limits.
+        acceleration_limits: the same for its acceleration limits.
+        jerk_limits: the same for its jerk limits.
+        recovery_speed: in (0, 1], of the velocity limit: the least speed at which a joint that starts
+            outside its position limits comes back.
+        on_limit: what gives way at a limit. 'redistribute': other joints take over, for the nearest twist
+            that limits allow; 'scale': the direction is kept, speed is given up.
+        exact: (6,) truth values: the rows (vx, vy, vz, ωx, ωy, ωz) that come before the others when
+            redistributing.
+        length_scale: [m] > 0: 1 rad/s weighs as much as length_scale m/s, as for VelocitySolver.
+        mask: (6,) truth values: the rows (vx, vy, vz, ωx, ωy, ωz) that matter; None: all.
+        frame: the axes of these rows, the base's or the tool's.
         """
     def continue_from(self, other: Servo) -> None:
         """
@@ -882,20 +901,23 @@ class TargetStream:
     than max_speed and max_angular_speed: not when a sample arrives, not when the stream stops or starts again, not
     when the target is found elsewhere.
     """
-    def __init__(self, mode: str = 'predict', *, max_speed: typing.SupportsFloat | typing.SupportsIndex = 1.5, max_angular_speed: typing.SupportsFloat | typing.SupportsIndex = 4.0, smoothing: typing.SupportsFloat | typing.SupportsIndex = 0.05, latency: typing.SupportsFloat | typing.SupportsIndex = 0.1, horizon: typing.SupportsFloat | typing.SupportsIndex = 0.1, timeout: typing.SupportsFloat | typing.SupportsIndex = 0.3, noise_linear: typing.SupportsFloat | typing.SupportsIndex = 0.002, noise_angular: typing.SupportsFloat | typing.SupportsIndex = 0.01, acceleration_linear: typing.SupportsFloat | typing.SupportsIndex = 3.0, acceleration_angular: typing.SupportsFloat | typing.SupportsIndex = 10.0, relocate: typing.SupportsInt | typing.SupportsIndex = 5) -> None:
+    def __init__(self, mode: typing.Literal['hold', 'interpolate', 'predict'] = 'predict', *, max_speed: typing.SupportsFloat | typing.SupportsIndex = 1.5, max_angular_speed: typing.SupportsFloat | typing.SupportsIndex = 4.0, smoothing: typing.SupportsFloat | typing.SupportsIndex = 0.05, latency: typing.SupportsFloat | typing.SupportsIndex = 0.1, horizon: typing.SupportsFloat | typing.SupportsIndex = 0.1, timeout: typing.SupportsFloat | typing.SupportsIndex = 0.3, noise_linear: typing.SupportsFloat | typing.SupportsIndex = 0.002, noise_angular: typing.SupportsFloat | typing.SupportsIndex = 0.01, acceleration_linear: typing.SupportsFloat | typing.SupportsIndex = 3.0, acceleration_angular: typing.SupportsFloat | typing.SupportsIndex = 10.0, relocate: typing.SupportsInt | typing.SupportsIndex = 5) -> None:
         """
-        mode: where the target is between samples, and after the last one. 'hold': at the last sample, for devices that
-            send only changes; 'interpolate': on a smooth curve through the samples, `latency` ago; 'predict': where a
-            constant-velocity Kalman filter expects it now.
-        max_speed [m/s], max_angular_speed [rad/s]: nothing is faster; a sample that would have to be is an outlier.
-        smoothing: [s] time constant of the way from where the target is to where a new sample says it is; at 0 the
-            twist jumps.
-        latency: [s] 'interpolate' plays so late: the sensor's delay, and one or two samples.
-        horizon, timeout: [s] so long after its last sample the target moves on as it did, and by then it has come to
-            rest, and the stream is stale.
-        noise_linear [m], noise_angular [rad]: standard deviation of a sample, each axis.
-        acceleration_linear [m/s²], acceleration_angular [rad/s²]: of what the target may do between samples.
-        relocate: so many refused samples in a row that agree with each other are believed.
+        mode: where the target is between samples, and after the last one. 'hold': at the last sample, for
+            devices that send only changes; 'interpolate': on a smooth curve through the samples, `latency`
+            ago; 'predict': where a constant-velocity Kalman filter expects it now.
+        max_speed: [m/s] > 0: nothing is faster; a sample that would have to be is an outlier.
+        max_angular_speed: [rad/s] > 0, likewise.
+        smoothing: [s] ≥ 0, time constant of the way from where the target is to where a new sample says it
+            is; at 0 the twist jumps.
+        latency: [s] ≥ 0: 'interpolate' plays so late: the sensor's delay, and one or two samples.
+        horizon: [s] ≥ 0: so long after its last sample the target moves on as it did, …
+        timeout: [s] ≥ horizon, > 0: … and by then it has come to rest, and the stream is stale.
+        noise_linear: [m] > 0, standard deviation of a sample, each axis.
+        noise_angular: [rad] > 0, likewise.
+        acceleration_linear: [m/s²] > 0, standard deviation of what the target may do between samples.
+        acceleration_angular: [rad/s²] > 0, likewise.
+        relocate: ≥ 1: so many refused samples in a row that agree with each other are believed.
         """
     def at(self, time: typing.SupportsFloat | typing.SupportsIndex) -> Target:
         """
@@ -987,13 +1009,14 @@ class ComputedTorque:
     With the true model every joint's error obeys ë + 2ζω ė + ω² e = 0 by itself (Beck et al. 2022,
     eqs. 18 to 20). Where an effort limit of the chain would be broken, v is scaled down in all joints alike.
     """
-    def __init__(self, chain: Chain, *, frequency: typing.SupportsFloat | typing.SupportsIndex = 20.0, damping_ratio: typing.SupportsFloat | typing.SupportsIndex = 1.0, gravity: numpy.typing.ArrayLike | None = None, payload: Inertia | None = None) -> None:
+    def __init__(self, chain: Chain, *, frequency: typing.SupportsFloat | typing.SupportsIndex = 20.0, damping_ratio: typing.SupportsFloat | typing.SupportsIndex = 1.0, gravity: numpy.typing.ArrayLike | None = (0.0, 0.0, -9.80665), payload: Inertia | None = None) -> None:
         """
-        frequency: ω [rad/s] > 0; the loop's rate should be 10 ω and more.
-        damping_ratio: ζ > 0; 1 is critical.
-        gravity, payload: what the controller knows of them, as for Dynamics.
-
         Raises Error where an option is out of its range, and where Dynamics does.
+
+        frequency: ω [rad/s] > 0 of the error's dynamics; the loop's rate should be 10 ω and more.
+        damping_ratio: ζ > 0; 1 is critical.
+        gravity: (3,) [m/s²] in base axes, as the controller knows it.
+        payload: what the controller knows of the tip's load, in the tip's frame, as for Dynamics.
         """
     def update(self, q: numpy.typing.ArrayLike, qdot: numpy.typing.ArrayLike, q_desired: numpy.typing.ArrayLike, qdot_desired: numpy.typing.ArrayLike, qddot_desired: numpy.typing.ArrayLike) -> ComputedTorqueStep:
         """
@@ -1115,22 +1138,33 @@ class ConstrainedIk:
     Follows a target pose inside every joint limit: an exact part, and the rest as well as the
     limits allow (Schreiber, Otter and Hirzinger 1999).
     """
-    def __init__(self, chain: Chain, dt: typing.SupportsFloat | typing.SupportsIndex = 0.001, *, exact: numpy.typing.ArrayLike = (1, 1, 1, 0, 0, 0), alpha: typing.Any = 1.0, beta: typing.Any = 5.0, gamma: typing.SupportsFloat | typing.SupportsIndex | None = None, max_error: typing.Any = None, iterations: typing.SupportsInt | typing.SupportsIndex = 2, torque_limits: bool = False, analytic: bool = True, mask: numpy.typing.ArrayLike | None = None, frame: str = 'base', gravity: numpy.typing.ArrayLike | None = None, position_limits: bool = True, velocity_limits: bool = True, acceleration_limits: bool = True, jerk_limits: bool = True, recovery_speed: typing.SupportsFloat | typing.SupportsIndex = 0.1) -> None:
+    def __init__(self, chain: Chain, dt: typing.SupportsFloat | typing.SupportsIndex = 0.001, *, exact: numpy.typing.ArrayLike | None = (1, 1, 1, 0, 0, 0), alpha: numpy.typing.ArrayLike | None = 1.0, beta: numpy.typing.ArrayLike | None = 5.0, gamma: typing.SupportsFloat | typing.SupportsIndex | None = None, max_error: numpy.typing.ArrayLike | None = ..., iterations: typing.SupportsInt | typing.SupportsIndex = 2, torque_limits: bool = False, analytic: bool = True, mask: numpy.typing.ArrayLike | None = (1, 1, 1, 1, 1, 1), frame: typing.Literal['base', 'tool'] = 'base', gravity: numpy.typing.ArrayLike | None = (0.0, 0.0, -9.80665), position_limits: bool = True, velocity_limits: bool = True, acceleration_limits: bool = True, jerk_limits: bool = True, recovery_speed: typing.SupportsFloat | typing.SupportsIndex = 0.1) -> None:
         """
-        dt: [s] from one step to the next.
-        exact: (6,) truth values: rows (vx, vy, vz, ωx, ωy, ωz) met exactly; the others as well as limits allow.
-        alpha, beta: a number or (6,): weights of the error and of its change in a cycle. Free of limits an error
-            decays by the factor β²/(α²+β²) a cycle (5 √(1 ms/dt) makes that 25 ms at any dt); with β = 0 the joints
-            may oscillate.
-        gamma: weight of the time scaling ϑ; None: the target is not slowed down.
-        max_error: a number or (6,) [m, rad], largest error of the approximate rows, each for itself; let go where
-            it cannot be had together with the exact part; None: any.
-        iterations: linearisations a step. torque_limits: hold the chain's efforts, with its inertias and
-        `gravity` (3,) [m/s²]; the closed form is not used then.
-        analytic: use the closed form where the chain has one and its answer is inside the limits.
-        mask, frame: rows that matter at all, in 'base' or 'tool' axes.
-        position_limits, …: which limits are held. recovery_speed: in (0, 1], of the velocity limit, least speed
-            of a joint that starts outside its position limits on its way back.
+        dt: [s] > 0, from one update to the next.
+        exact: (6,) truth values: the rows (vx, vy, vz, ωx, ωy, ωz) met exactly; the others as well as
+            limits allow.
+        alpha: ≥ 0, a number or (6,) [1/m, 1/rad]: weights of the error of the rows that are not exact.
+        beta: ≥ 0, a number or (6,) [1/m, 1/rad]: weights of that error's change in a cycle. Free of limits
+            an error decays by the factor β²/(α²+β²) a cycle (5 √(1 ms/dt) makes that 25 ms at any dt); with
+            β = 0 the joints may oscillate.
+        gamma: > 0, weight of the time scaling ϑ; None: the target is not slowed down.
+        max_error: > 0, a number or (6,) [m, rad]: the largest error of the rows that are not exact, each
+            for itself; let go where it cannot be had together with the exact part.
+        iterations: 1 to 100 linearisations a cycle.
+        torque_limits: whether the chain's effort limits are held, with its inertias; the closed form is not
+            used then.
+        analytic: whether the closed form is used where the chain has one and its answer is inside the
+            limits.
+        mask: (6,) truth values: the rows (vx, vy, vz, ωx, ωy, ωz) that matter; None: all.
+        frame: the axes of these rows, the base's or the tool's.
+        gravity: (3,) [m/s²] in base axes, for torque_limits.
+        position_limits: whether the chain's position limits are held, now and so that they can be held for
+            ever.
+        velocity_limits: the same for its velocity limits.
+        acceleration_limits: the same for its acceleration limits.
+        jerk_limits: the same for its jerk limits.
+        recovery_speed: in (0, 1], of the velocity limit: the least speed at which a joint that starts
+            outside its position limits comes back.
         """
     def reset(self, q: numpy.typing.ArrayLike, qdot: numpy.typing.ArrayLike | None = None) -> None:
         """

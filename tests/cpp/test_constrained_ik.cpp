@@ -44,7 +44,7 @@ Pose moved(const Pose& from, const Twist& by) {
 
 ConstrainedIkOptions unlimited() {
   ConstrainedIkOptions o;
-  o.position_limits = o.velocity_limits = o.acceleration_limits = o.jerk_limits = false;
+  o.limits.position = o.limits.velocity = o.limits.acceleration = o.limits.jerk = false;
   o.analytic = false;
   return o;
 }
@@ -205,7 +205,7 @@ TEST_CASE("errors decay by β²/(α²+β²) a cycle, and the exact part is exact
     CHECK(step.error.norm() < 1e-5);
     // A start off the target that is not the target's motion: hold the old target, then let the arm be elsewhere.
     ConstrainedIkOptions tight = o;
-    tight.velocity_limits = true;
+    tight.limits.velocity = true;
     JointLimits limits = chain.limits();
     limits.velocity.setConstant(0.05);
     ConstrainedIk held(chain.with_limits(limits), tight);
@@ -277,7 +277,7 @@ TEST_CASE("time scaling: none where none is needed; all six rows exact: the path
   o.exact.fill(true);
   o.analytic = false;
   // How fast the path can be taken further on is not known to a step, so with these it may be too fast to brake.
-  o.acceleration_limits = false;
+  o.limits.acceleration = false;
   ConstrainedIk ik(chain, o);
   JointVector home(6);
   home << 0.0, -1.3, 1.5, 0.3, 0.5, 0.0;
@@ -323,7 +323,7 @@ TEST_CASE("the largest error allowed is kept where it can be together with the e
   o.analytic = false;
   o.gamma = 0.1;
   o.max_error.tail<3>().setConstant(0.01);
-  o.acceleration_limits = false;  // with them a step that cannot see ahead is at times too fast to keep it
+  o.limits.acceleration = false;  // with them a step that cannot see ahead is at times too fast to keep it
   ConstrainedIk ik(chain.with_limits(limits), o);
   JointVector home(6);
   home << 0.0, -1.3, 1.5, 0.0, 0.15, 0.0;
@@ -460,5 +460,5 @@ TEST_CASE("bad targets stop the arm; bad options are refused with the facts") {
   refused([](auto& o) { o.iterations = 0; }, "iterations");
   refused([](auto& o) { o.task.mask = {}; }, "mask");
   refused([](auto& o) { o.torque_limits = true; }, "inertia");
-  refused([](auto& o) { o.recovery_speed = 0.0; }, "recovery_speed");
+  refused([](auto& o) { o.limits.recovery_speed = 0.0; }, "recovery_speed");
 }

@@ -143,7 +143,7 @@ TEST_CASE("from rest inside the limits nothing breaks them, whatever is chosen i
         start[i] = draw_position(random, limits, i);
         choosers.emplace_back(random, dt, start[i]);
       }
-      LimitTracker tracker(limits, {.dt = dt});
+      LimitTracker tracker(limits, dt);
       tracker.reset(start);
       Checker check(limits, dt, start, JointVector::Zero(n));
       long order = 0, moved = 0, flagged = 0, stop = 0;
@@ -192,7 +192,7 @@ TEST_CASE("from outside: acceleration and jerk hold, speed falls, the joint come
       double q = random.uniform(-half, half), qdot = 0.0;
       if (kind != 1) q = (random.chance(0.5) ? 1.0 : -1.0) * (half + random.decades(-6.0, 0.0));
       if (kind != 0) qdot = random.uniform(-3.0, 3.0) * std::min(v, 1.0);
-      LimitTracker tracker(limits, {.dt = dt});
+      LimitTracker tracker(limits, dt);
       tracker.reset(one(q), one(qdot));
 
       // Stop, turn round, travel and settle, a few times over.
@@ -259,7 +259,7 @@ TEST_CASE("no more is given up than must be: a limit is reached in the least tim
     if (cycles < 3.0 || cycles > 20000.0) continue;
     const bool up = random.chance(0.5);
     const double goal = up ? limits.upper[0] : limits.lower[0];
-    LimitTracker tracker(limits, {.dt = dt});
+    LimitTracker tracker(limits, dt);
     tracker.reset(one(goal + (up ? -distance : distance)));
     int cycle = 0;
     for (; cycle < 2.0 * cycles && std::abs(tracker.q()[0] - goal) > 1e-9 * distance; ++cycle) {
@@ -288,7 +288,7 @@ TEST_CASE("without a jerk limit: the largest velocity from which braking, cycle 
     JointLimits limits = no_limits(1);
     limits.upper[0] = room;
     limits.acceleration[0] = a;
-    LimitTracker tracker(limits, {.dt = dt});
+    LimitTracker tracker(limits, dt);
     tracker.reset(one(0.0), one(a * dt * 2.0 * (steps + 1.0)));  // too fast …
     CHECK(tracker.recovering() == 1);
     // … so bounded by acceleration; the position's bound is where a slower start meets it.
@@ -320,7 +320,7 @@ TEST_CASE("a jerk limit that is large enough is none") {
     if (random.chance(0.85)) limits.acceleration[0] = random.decades(-1.0, 3.0);
     JointLimits jerky = limits;
     jerky.jerk[0] = 1e9 * std::min(limits.acceleration[0], 1e3 / dt) / dt;
-    LimitTracker free(limits, {.dt = dt}), bound(jerky, {.dt = dt});
+    LimitTracker free(limits, dt), bound(jerky, dt);
     const JointVector start = one(random.uniform(-half, half));
     free.reset(start);
     bound.reset(start);
@@ -354,7 +354,7 @@ TEST_CASE("bounds are continuous in the state, out of the limits too") {
       if (with_jerk) limits.jerk[0] = random.decades(-1.0, 4.0);
       const double q = random.chance(0.5) ? random.uniform(-1.5, 1.5) : random.chance(0.5) ? 1.0 : -1.0;
       const double v = random.chance(0.2) ? 0.0 : 1.5 * limits.velocity[0] * random.uniform(-1.0, 1.0);
-      LimitTracker a(limits, {.dt = dt}), b(limits, {.dt = dt});
+      LimitTracker a(limits, dt), b(limits, dt);
       a.reset(one(q), one(v));
       b.reset(one(q + 1e-12 * random.normal()), one(v + 1e-12 * random.normal()));
       // Positions count by 1/dt, and near limits the bounds are roots.
@@ -369,7 +369,7 @@ TEST_CASE("bounds are continuous in the state, out of the limits too") {
 TEST_CASE("which limit forms a bound") {
   JointLimits limits = no_limits(1);
   const auto kind = [&](double q, double v) {
-    LimitTracker tracker(limits, {.dt = 0.01});
+    LimitTracker tracker(limits, 0.01);
     tracker.reset(one(q), one(v));
     return tracker.bounds().upper_kind[0];
   };
@@ -397,12 +397,12 @@ TEST_CASE("limits can be left out, and a joint that is outside moves in faster i
   limits.velocity[0] = 2.0;
   limits.acceleration[0] = 10.0;
   limits.jerk[0] = 100.0;
-  LimitTracker none(limits, {.dt = 0.01, .position = false, .velocity = false, .acceleration = false, .jerk = false});
+  LimitTracker none(limits, 0.01, {.position = false, .velocity = false, .acceleration = false, .jerk = false});
   none.reset(one(5.0), one(7.0));
   CHECK(none.bounds().lower[0] == -kInfinity);
   CHECK(none.bounds().upper[0] == kInfinity);
   CHECK(none.recovering() == 0);
-  LimitTracker fast(limits, {.dt = 0.01, .acceleration = false, .jerk = false, .recovery_speed = 0.5});
+  LimitTracker fast(limits, 0.01, {.acceleration = false, .jerk = false, .recovery_speed = 0.5});
   fast.reset(one(1.5));
   CHECK(fast.outside() == 1);
   CHECK(fast.recovering() == 1);
@@ -415,7 +415,7 @@ TEST_CASE("what is not a number, or of a wrong size, stops the joint as the limi
   JointLimits limits = no_limits(2);
   limits.acceleration.setConstant(10.0);
   limits.jerk[1] = 100.0;
-  LimitTracker a(limits, {.dt = 0.01}), b(limits, {.dt = 0.01});
+  LimitTracker a(limits, 0.01), b(limits, 0.01);
   a.reset(JointVector::Zero(2), JointVector::Ones(2));
   b.reset(JointVector::Zero(2), JointVector::Ones(2));
   for (int cycle = 0; cycle < 200; ++cycle) {
@@ -435,8 +435,8 @@ TEST_CASE("what is not a number, or of a wrong size, stops the joint as the limi
 TEST_CASE("settings and starts that make no sense are refused") {
   const JointLimits limits = no_limits(2);
   for (const double bad : {0.0, -1.0, kNan, kInfinity}) {
-    CHECK_THROWS_AS(LimitTracker(limits, {.dt = bad}), Error);
-    CHECK_THROWS_AS(LimitTracker(limits, {.recovery_speed = bad}), Error);
+    CHECK_THROWS_AS(LimitTracker(limits, bad), Error);
+    CHECK_THROWS_AS(LimitTracker(limits, 1e-3, {.recovery_speed = bad}), Error);
   }
   CHECK_THROWS_AS(LimitTracker(JointLimits{}), Error);
   for (const double bad : {0.0, -1.0, kNan}) {

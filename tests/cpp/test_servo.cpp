@@ -69,14 +69,14 @@ bool same(const ServoStep& a, const ServoStep& b) {
 // The rule and nothing else.
 ServoOptions free_options() {
   ServoOptions options;
-  options.position_limits = options.velocity_limits = options.acceleration_limits = options.jerk_limits = false;
+  options.limits.position = options.limits.velocity = options.limits.acceleration = options.limits.jerk = false;
   return options;
 }
 
 // Velocity limits, by scaling.
 ServoOptions scaled_options() {
   ServoOptions options = free_options();
-  options.velocity_limits = true;
+  options.limits.velocity = true;
   options.on_limit = OnLimit::Scale;
   return options;
 }
@@ -90,9 +90,9 @@ void check_step(const Chain& chain, const ServoStep& step, const JointVector& be
   CHECK(step.achieved_twist.allFinite());
   const JointLimits& limits = chain.limits();
   for (int i = 0; i < chain.dof(); ++i) {
-    if (options.velocity_limits) CHECK(std::abs(step.qdot[i]) <= limits.velocity[i]);
+    if (options.limits.velocity) CHECK(std::abs(step.qdot[i]) <= limits.velocity[i]);
     CHECK(std::abs(step.q[i] - before[i] - options.dt * step.qdot[i]) <= 1e-12 * (1.0 + std::abs(before[i])));
-    if (!options.position_limits || before[i] < limits.lower[i] || before[i] > limits.upper[i]) continue;
+    if (!options.limits.position || before[i] < limits.lower[i] || before[i] > limits.upper[i]) continue;
     CHECK(step.q[i] >= limits.lower[i]);
     CHECK(step.q[i] <= limits.upper[i]);
   }
@@ -450,10 +450,10 @@ TEST_CASE("options out of their range are refused") {
     refuses([bad](ServoOptions& o) { o.posture_gain = bad; });
     refuses([bad](ServoOptions& o) { o.posture_max_speed = bad; });
     refuses([bad](ServoOptions& o) { o.length_scale = bad; });
-    refuses([bad](ServoOptions& o) { o.recovery_speed = bad; });
+    refuses([bad](ServoOptions& o) { o.limits.recovery_speed = bad; });
   }
-  refuses([](ServoOptions& o) { o.recovery_speed = 0.0; });
-  refuses([](ServoOptions& o) { o.recovery_speed = 1.5; });
+  refuses([](ServoOptions& o) { o.limits.recovery_speed = 0.0; });
+  refuses([](ServoOptions& o) { o.limits.recovery_speed = 1.5; });
   refuses([](ServoOptions& o) {
     o.task.mask = {true, true, true, false, false, false};
     o.exact = {false, false, false, true, false, false};
@@ -648,7 +648,7 @@ TEST_CASE("zero commands: nothing moves, and that is as asked") {
   for (const auto& [name, chain] : arms()) {
     for (const Method& method : all_methods()) {
       ServoOptions options;
-      options.position_limits = false;  // from outside it would come back
+      options.limits.position = false;  // from outside it would come back
       Servo servo(chain, method, options);
       servo.reset(random.chance(0.5) ? JointVector(JointVector::Zero(chain.dof()))
                                      : regular_configuration(random, chain));

@@ -75,10 +75,10 @@ JointVector regular(Random& random, const Chain& chain, double least_ratio) {
 // Which limits to hold.
 ServoOptions holding(bool position, bool velocity, bool acceleration, bool jerk) {
   ServoOptions options;
-  options.position_limits = position;
-  options.velocity_limits = velocity;
-  options.acceleration_limits = acceleration;
-  options.jerk_limits = jerk;
+  options.limits.position = position;
+  options.limits.velocity = velocity;
+  options.limits.acceleration = acceleration;
+  options.limits.jerk = jerk;
   options.soft_start = 0.0;
   return options;
 }
@@ -299,7 +299,7 @@ TEST_CASE("scaling keeps the direction, and gets there in proportion, whenever t
       options.on_limit = OnLimit::Scale;
       Servo servo(chain, JParse{}, options);
       VelocitySolver solver(JParse{});
-      LimitTracker tracker(chain.limits(), {.acceleration = accelerations, .jerk = accelerations});
+      LimitTracker tracker(chain.limits(), 1e-3, {.acceleration = accelerations, .jerk = accelerations});
       const JointVector start = inside(random, chain);
       servo.reset(start);
       tracker.reset(start);

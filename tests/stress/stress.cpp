@@ -472,11 +472,11 @@ class Episode {
       o.iterations = random_.integer(1, 3);
       o.analytic = random_.chance(0.7);
       o.torque_limits = random_.chance(0.3);
-      o.position_limits = holds[0];
-      o.velocity_limits = holds[1];
-      o.acceleration_limits = holds[2];
-      o.jerk_limits = holds[3];
-      o.recovery_speed = recovery_speed;
+      o.limits.position = holds[0];
+      o.limits.velocity = holds[1];
+      o.limits.acceleration = holds[2];
+      o.limits.jerk = holds[3];
+      o.limits.recovery_speed = recovery_speed;
       std::optional<ConstrainedIk> ik;
       try {
         ik.emplace(chain, o);
@@ -523,11 +523,11 @@ class Episode {
         if (random_.chance(0.5)) o.posture_max_speed = random_.decades(-2.0, 1.0);
       }
       if (random_.chance(0.3)) o.length_scale = random_.decades(-1.5, 1.0);
-      o.position_limits = holds[0];
-      o.velocity_limits = holds[1];
-      o.acceleration_limits = holds[2];
-      o.jerk_limits = holds[3];
-      o.recovery_speed = recovery_speed;
+      o.limits.position = holds[0];
+      o.limits.velocity = holds[1];
+      o.limits.acceleration = holds[2];
+      o.limits.jerk = holds[3];
+      o.limits.recovery_speed = recovery_speed;
       const Method method = random_method(random_);
       Servo servo(chain, method, o);
       servo.reset(start, position_only_start ? JointVector() : moving);

@@ -52,11 +52,7 @@ struct ConstrainedIkOptions {
   Eigen::Vector3d gravity{0.0, 0.0, -9.80665};  ///< [m/s²], in base axes
   /// Use the closed form where the chain has one and its answer is inside the limits (35).
   bool analytic = true;
-  bool position_limits = true;  ///< which of the chain's limits are held; see limits.hpp
-  bool velocity_limits = true;
-  bool acceleration_limits = true;
-  bool jerk_limits = true;
-  double recovery_speed = 0.1;  ///< in (0, 1], of the velocity limit: least speed back inside the position limits
+  LimitOptions limits{};  ///< which of the chain's limits are held; see limits.hpp
 };
 
 /// Where a step comes from.

@@ -39,10 +39,9 @@
 
 namespace sigmaik {
 
-/// Settings of a LimitTracker.
+/// Which of a chain's limits a LimitTracker holds, and how an arm comes back that starts outside them.
 struct LimitOptions {
-  double dt = 1e-3;      ///< [s] > 0, from one cycle to the next
-  bool position = true;  ///< which limits are held
+  bool position = true;
   bool velocity = true;
   bool acceleration = true;
   bool jerk = true;
@@ -65,13 +64,14 @@ struct VelocityBounds {
 
 /// Follows the command of an arm, q ← q + q̇ dt, and says before each cycle how fast each joint may go.
 ///
-///     LimitTracker tracker(chain.limits(), {.dt = 1e-3});
+///     LimitTracker tracker(chain.limits(), 1e-3);
 ///     tracker.reset(q);
 ///     each cycle:  qdot = …;  tracker.advance(qdot);  // moves qdot into tracker.bounds()
 class LimitTracker {
  public:
-  /// \throws Error where an option or a limit is out of its range
-  explicit LimitTracker(const JointLimits& limits, const LimitOptions& options = {});
+  /// \param dt [s] > 0, from one cycle to the next
+  /// \throws Error where dt, an option or a limit is out of its range
+  explicit LimitTracker(const JointLimits& limits, double dt = 1e-3, const LimitOptions& options = {});
 
   /// Starts, or starts again, at q (n,) with q̇ = qdot (n,) and no acceleration; qdot empty: at rest.
   /// \throws Error where a size is wrong or an entry is not finite
@@ -109,6 +109,7 @@ class LimitTracker {
   std::uint16_t recovering() const noexcept { return recovering_; }
 
   int dof() const noexcept { return n_; }
+  double dt() const noexcept { return dt_; }  ///< [s]
   const LimitOptions& options() const noexcept { return options_; }
 
  private:
@@ -138,12 +139,12 @@ class LimitTracker {
   void bound_with_jerk(int i) noexcept;
 
   LimitOptions options_;
-  double per_dt_;
+  double dt_, per_dt_;
   int n_ = 0;
   std::array<Joint, kMaxJoints> joints_{};
   // The same by kind, for joints far from all limits, which is most of them, most of the time. Acceleration is infinite
   // where there is more to it.
-  using Numbers = Eigen::Array<double, kMaxJoints, 1, kLayout>;
+  using Numbers = Eigen::Array<double, kMaxJoints, 1>;
   Numbers lower_, upper_, velocity_, acceleration_;
   bool has_jerk_ = false;
   JointVector q_, v_, stop_;

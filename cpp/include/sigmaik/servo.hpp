@@ -46,11 +46,7 @@ struct ServoOptions {
   double posture_gain = 0.0;  ///< [1/s] ≥ 0
   double posture_max_speed = std::numeric_limits<double>::infinity();  ///< [rad/s or m/s] > 0, a joint
   AvoidanceOptions avoid{};  ///< added to the posture's velocity: away from singularities, where the arm is redundant
-  bool position_limits = true;  ///< which of the chain's limits are held; see limits.hpp
-  bool velocity_limits = true;
-  bool acceleration_limits = true;
-  bool jerk_limits = true;
-  double recovery_speed = 0.1;  ///< in (0, 1], of the velocity limit: least speed back inside the position limits
+  LimitOptions limits{};     ///< which of the chain's limits are held; see limits.hpp
   OnLimit on_limit = OnLimit::Redistribute;
   /// Rows (vx, vy, vz, ωx, ωy, ωz), in the task's axes, that come before the others where Redistribute cannot do all.
   std::array<bool, 6> exact{};

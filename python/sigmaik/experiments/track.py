@@ -16,7 +16,7 @@ import math
 import pathlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import BinaryIO
+from typing import BinaryIO, Literal, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -502,7 +502,7 @@ def follow(e: TrackExperiment, variant: Variant, progress: Callable[[int], None]
     if variant.mode not in ("true", "raw"):
         latency = camera.delay + 2.5 / camera.rate if s.latency is None else s.latency
         stream = sk.TargetStream(
-            variant.mode,
+            cast(Literal["hold", "interpolate", "predict"], variant.mode),
             max_speed=s.max_speed,
             max_angular_speed=s.max_angular_speed,
             smoothing=s.smoothing,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields, replace
+from typing import Literal
 
 from numpy.typing import ArrayLike
 
@@ -28,9 +29,9 @@ class Settings:
     max_angular_error: float = 0.4  #: [rad] longer orientation errors are shortened to it
     posture_gain: float = 0.5  #: [1/s] pull towards where the arm started
     limits: bool = True  #: hold all joint limits
-    on_limit: str = "redistribute"  #: or "scale"
+    on_limit: Literal["redistribute", "scale"] = "redistribute"
     mask: tuple[bool, ...] = (True,) * 6  #: rows (vx, vy, vz, ωx, ωy, ωz) that matter
-    frame: str = "base"  #: axes of the mask's rows: "base" or "tool"
+    frame: Literal["base", "tool"] = "base"  #: axes of the mask's rows
     length_scale: float = 1.0  #: [m] 1 rad weighs as much as this length
 
     def __post_init__(self) -> None:
