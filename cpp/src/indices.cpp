@@ -7,6 +7,7 @@
 
 #include <sigmaik/spectrum.hpp>
 
+#include "aligned.hpp"
 #include "message.hpp"
 #include "quasi_random.hpp"
 #include "ranges.hpp"
@@ -86,7 +87,7 @@ IndexFunction::IndexFunction(Index index, const IndexOptions& options)
   detail::require(
       sigma.allFinite() && (sigma - sigma.transpose()).cwiseAbs().maxCoeff() <= 1e-9 * sigma.cwiseAbs().maxCoeff(),
       "Σ must be finite and symmetric");
-  const Eigen::SelfAdjointEigenSolver<TaskMatrix> eigen(sigma);
+  const Eigen::SelfAdjointEigenSolver<detail::Aligned<TaskMatrix>> eigen(sigma);
   detail::require(eigen.eigenvalues()[0] > 0.0, "Σ must be positive definite; its smallest eigenvalue is ",
                   eigen.eigenvalues()[0]);
   whiten_ = eigen.operatorInverseSqrt();

@@ -61,4 +61,34 @@ SIGMAIK_INLINE double dot(const double (&x)[length], const double (&y)[length]) 
   return sum(s);
 }
 
+template <int lanes, int length>
+SIGMAIK_INLINE void set_zero(double (&x)[length]) {
+  const auto zero = splat<lanes>(0.0);
+#pragma GCC unroll 12
+  for (int j = 0; j < length / lanes; ++j) __builtin_memcpy(x + j * lanes, &zero, sizeof zero);
+}
+
+template <int lanes, int length>
+SIGMAIK_INLINE void copy_column(const double (&x)[length], double (&to)[length]) {
+  Column<lanes, length>::load(x).store(to);
+}
+
+template <int lanes, int length>
+SIGMAIK_INLINE void swap_columns(double (&x)[length], double (&y)[length]) {
+  const auto a = Column<lanes, length>::load(x), b = Column<lanes, length>::load(y);
+  a.store(y);
+  b.store(x);
+}
+
+// x += factor y.
+template <int lanes, int length>
+SIGMAIK_INLINE void add_scaled(double (&x)[length], double factor, const double (&y)[length]) {
+  auto a = Column<lanes, length>::load(x);
+  const auto b = Column<lanes, length>::load(y);
+  const auto f = splat<lanes>(factor);
+#pragma GCC unroll 12
+  for (int j = 0; j < length / lanes; ++j) a.at[j] += f * b.at[j];
+  a.store(x);
+}
+
 }  // namespace sigmaik::detail

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "active_set.hpp"
 #include "finite.hpp"
@@ -12,6 +13,8 @@ namespace {
 
 using detail::ActiveSet;
 using detail::ActiveSetProblem;
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 static_assert(detail::kActiveSetRows == kMaxObjectives + kMaxEqualities + kMaxInequalities);
 
@@ -29,7 +32,7 @@ __attribute__((target("avx2,fma"))) void run_avx2(ActiveSetProblem<P>& problem) 
 template <int P>
 void (*run)(ActiveSetProblem<P>&) noexcept = run_baseline<P>;
 
-// Set when the library is loaded; usable, if slower, even before.
+// Chosen while the library is loaded; a call before that runs the baseline, which is slower.
 [[maybe_unused]] const bool chosen = [] {
   __builtin_cpu_init();
   if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) {
@@ -59,7 +62,6 @@ bool valid(const LeastSquaresProblem& p, int n) noexcept {
       !detail::finite(p.d)) {
     return false;
   }
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
   for (const double h : p.h) {
     if (!(h > -kInfinity)) return false;
   }
@@ -72,15 +74,18 @@ bool valid(const LeastSquaresProblem& p, int n) noexcept {
   return true;
 }
 
+// The problem for the kernel, padded to P unknowns; and for each of the kernel's inequalities the row of G, because
+// rows without a bound are left out.
 template <int P>
-LeastSquaresSolution solve_padded(const LeastSquaresProblem& p, int n, const UnknownVector& x, std::uint32_t at_lower,
-                                  std::uint32_t at_upper, std::uint32_t active) noexcept {
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+struct Packed {
   ActiveSetProblem<P> work;
-  work.unknowns = n;
-  work.inequalities = work.equalities = work.objectives = 0;
+  std::array<int, kMaxInequalities> inequality;
+};
+
+template <int P>
+void pack_rows(const LeastSquaresProblem& p, int n, std::uint32_t active, Packed<P>& packed) noexcept {
+  ActiveSetProblem<P>& work = packed.work;
   int rows = 0;
-  std::array<int, kMaxInequalities> inequality;  // a row without a bound is none
   const auto append = [&](const RowMatrix& matrix, const RowVector& right, Eigen::Index k) {
     const double* from = matrix.data() + k * matrix.cols();
     int j = 0;
@@ -92,7 +97,7 @@ LeastSquaresSolution solve_padded(const LeastSquaresProblem& p, int n, const Unk
   for (int k = 0; k < p.G.rows(); ++k) {
     if (p.h[k] == kInfinity) continue;
     if (active >> k & 1u) work.active |= 1u << rows;
-    inequality[static_cast<std::size_t>(rows)] = k;
+    packed.inequality[static_cast<std::size_t>(rows)] = k;
     append(p.G, p.h, k);
   }
   work.inequalities = rows;
@@ -100,35 +105,29 @@ LeastSquaresSolution solve_padded(const LeastSquaresProblem& p, int n, const Unk
   work.equalities = rows - work.inequalities;
   for (int k = 0; k < p.A.rows(); ++k) append(p.A, p.b, k);
   work.objectives = rows - work.inequalities - work.equalities;
+}
+
+template <int P, typename Guess>
+void pack_bounds(const LeastSquaresProblem& p, int n, const Guess& guess, ActiveSetProblem<P>& work) noexcept {
   work.at_lower = work.at_upper = 0;
   for (int i = 0; i < P; ++i) {
     const bool inside = i < n;
     work.lower[i] = inside && p.lower.size() != 0 ? p.lower[i] : -kInfinity;
     work.upper[i] = inside && p.upper.size() != 0 ? p.upper[i] : kInfinity;
-    work.x[i] = inside ? x[i] : 0.0;
-    if ((at_lower >> i & 1u) != 0 && work.lower[i] > -kInfinity) work.at_lower |= 1u << i;
-    if ((at_upper >> i & 1u) != 0 && work.upper[i] < kInfinity) work.at_upper |= 1u << i;
+    work.x[i] = inside ? guess.x[i] : 0.0;
+    if ((guess.at_lower >> i & 1u) != 0 && work.lower[i] > -kInfinity) work.at_lower |= 1u << i;
+    if ((guess.at_upper >> i & 1u) != 0 && work.upper[i] < kInfinity) work.at_upper |= 1u << i;
   }
-  work.finished = false;
-  run<P>(work);
+}
 
-  LeastSquaresSolution s;
-  s.x = Eigen::Map<const UnknownVector>(work.x, n);
-  if (!s.x.allFinite()) {  // too large for numbers
-    s.x.setZero();
-    return s;
-  }
-  s.steps = work.steps;
-  s.at_lower = work.at_lower;
-  s.at_upper = work.at_upper;
-  for (int k = 0; k < work.inequalities; ++k) {
-    if (work.active >> k & 1u) s.active |= 1u << inequality[static_cast<std::size_t>(k)];
-  }
+// Computes what is left of G x ≤ h and C x = d, and from it the status.
+template <int P>
+void measure_constraints(const ActiveSetProblem<P>& work, LeastSquaresSolution& s) noexcept {
   double over = 0.0, off = 0.0;
   bool met = true;
   for (int k = 0; k < work.inequalities + work.equalities; ++k) {
     double sum = -work.rhs[k], terms = std::abs(work.rhs[k]);
-    for (int j = 0; j < n; ++j) {
+    for (int j = 0; j < work.unknowns; ++j) {
       sum += work.row[k][j] * work.x[j];
       terms += std::abs(work.row[k][j] * work.x[j]);
     }
@@ -142,6 +141,31 @@ LeastSquaresSolution solve_padded(const LeastSquaresProblem& p, int n, const Unk
   s.status = !work.finished ? LeastSquaresStatus::StepLimit
              : met          ? LeastSquaresStatus::Optimal
                             : LeastSquaresStatus::Infeasible;
+}
+
+template <int P, typename Guess>
+LeastSquaresSolution solve_padded(const LeastSquaresProblem& p, int n, const Guess& guess) noexcept {
+  Packed<P> packed;
+  ActiveSetProblem<P>& work = packed.work;
+  work.unknowns = n;
+  work.finished = false;
+  pack_rows(p, n, guess.active, packed);
+  pack_bounds(p, n, guess, work);
+  run<P>(work);
+
+  LeastSquaresSolution s;
+  s.x = Eigen::Map<const UnknownVector>(work.x, n);
+  if (!s.x.allFinite()) {  // overflow
+    s.x.setZero();
+    return s;
+  }
+  s.steps = work.steps;
+  s.at_lower = work.at_lower;
+  s.at_upper = work.at_upper;
+  for (int k = 0; k < work.inequalities; ++k) {
+    if (work.active >> k & 1u) s.active |= 1u << packed.inequality[static_cast<std::size_t>(k)];
+  }
+  measure_constraints(work, s);
   return s;
 }
 
@@ -170,11 +194,11 @@ LeastSquaresSolution LeastSquares::solve(const LeastSquaresProblem& problem) noe
   }
   LeastSquaresSolution s;
   if (n <= 8) {
-    s = solve_padded<8>(problem, n, guess_.x, guess_.at_lower, guess_.at_upper, guess_.active);
+    s = solve_padded<8>(problem, n, guess_);
   } else if (n <= 16) {
-    s = solve_padded<16>(problem, n, guess_.x, guess_.at_lower, guess_.at_upper, guess_.active);
+    s = solve_padded<16>(problem, n, guess_);
   } else {
-    s = solve_padded<kMaxUnknowns>(problem, n, guess_.x, guess_.at_lower, guess_.at_upper, guess_.active);
+    s = solve_padded<kMaxUnknowns>(problem, n, guess_);
   }
   guess_.x = s.x;
   guess_.at_lower = s.at_lower;

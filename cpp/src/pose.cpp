@@ -62,7 +62,7 @@ Twist pose_error(const Pose& current, const Pose& target) noexcept {
   return error;
 }
 
-bool is_pose(const Eigen::Matrix4d& matrix) noexcept {
+bool is_pose(const PoseMatrix& matrix) noexcept {
   if (!detail::finite(matrix)) return false;
   if (matrix.row(3) != Eigen::RowVector4d(0.0, 0.0, 0.0, 1.0)) return false;
   const Eigen::Matrix3d r = matrix.topLeftCorner<3, 3>();

@@ -116,10 +116,11 @@ Solution VelocitySolver::solve(const TaskJacobianRef& jacobian, const TaskRef& t
     // The rule is; but a posture that its projector lets through moves the tip, and so does rounding of large speeds.
     TaskVector missed = s.achieved_twist - twist;
     if (select) missed = select_rows(task_, rotation, Twist(missed));
+    double most = 0.0;
     for (int row = 0; row < missed.size(); ++row) {
-      if ((angular >> row & 1u) != 0) missed[row] *= length_scale_;
+      most = std::max(most, std::abs((angular >> row & 1u) != 0 ? missed[row] * length_scale_ : missed[row]));
     }
-    exact = missed.cwiseAbs().maxCoeff() <= 1e-9 * enough;
+    exact = most <= 1e-9 * enough;
   }
   s.status = exact ? Status::Ok : Status::Damped;
   s.singular = resolution.singular;

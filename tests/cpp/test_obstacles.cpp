@@ -310,7 +310,7 @@ TEST_CASE("collision cost: CHOMP's hinge of every moving sphere, with its gradie
       REQUIRE((g - 3.0 * slope).cwiseAbs().maxCoeff() < 1e-11);
       REQUIRE((g - g2).cwiseAbs().maxCoeff() < 1e-12);
       REQUIRE((h - 3.0 * curvature).cwiseAbs().maxCoeff() < 1e-9);
-      REQUIRE(Eigen::SelfAdjointEigenSolver<JointMatrix>(h).eigenvalues()[0] > -1e-9);
+      REQUIRE(Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(h).eigenvalues()[0] > -1e-9);
       REQUIRE(min_distance(spheres, field, q) == doctest::Approx(least).epsilon(1e-12));
       if (!smooth) continue;
       ++checked;

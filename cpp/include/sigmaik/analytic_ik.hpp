@@ -11,7 +11,7 @@
 namespace sigmaik {
 
 /// Postures of a six-joint arm [rad].
-using SixJoints = Eigen::Matrix<double, 6, 1>;
+using SixJoints = Eigen::Matrix<double, 6, 1, kLayout>;
 
 /// What AnalyticIk found.
 enum class AnalyticStatus : std::int8_t {
@@ -100,35 +100,51 @@ class AnalyticIk {
   const Chain& chain() const noexcept { return chain_; }
 
  private:
+  friend struct AnalyticSetup;
   friend struct AnalyticWalk;
 
+  // Frames. Each z axis lies along the axis of a joint; αij is the angle from axis i to axis j.
+  //
+  //     {s}  shoulder: z along axis 1, axis 2 in the plane of x and z, on the side of x
+  //     {p}  planar arm: {p} = {s} Ry(α12), so that z lies along axis 2
+  //     {4}  z along axis 4, axis 5 in the plane of x and z, on the side of x
+  //     {5a} {5a} = {4} Ry(α45): z along axis 5, and axis 4 in the plane of x and z
+  //     {5b} {5b} = {5a} Rz(q5 + zero5): z along axis 5, and axis 6 in the plane of x and z, on the side of x
+  //     {6}  hand: {6} = {5b} Ry(α56), so that z lies along axis 6
+  //
+  //        axis 4   axis 5   axis 6
+  //             \  α45 | α56  /
+  //               \    |    /            q5 turns the plane of axes 5 and 6, {5b}, against the plane of axes 4 and 5,
+  //                 \  |  /              {5a}; both planes contain axis 5 and the wrist centre W.
+  //                   \|/
+  //                    W
   struct Shoulder {
-    Eigen::Matrix3d from_base;  // base axes to those of the shoulder: z along axis 1, axis 2 in the plane of x, z
+    Eigen::Matrix3d from_base;  // axes of the base to those of {s}
     Eigen::Vector3d origin;     // of joint 1, in the base [m]
-    double c12, s12;            // of the angle from axis 1 to axis 2
-    double height;              // of the wrist centre along axis 2, seen from joint 1's origin [m]
-    double x, y;                // axis 2 in its normal plane, seen from joint 1's origin [m]
+    double c12, s12;            // cosine and sine of α12
+    double height;              // of the wrist centre along axis 2, from the origin of joint 1 [m]
+    double x, y;                // axis 2 in {p}, from the origin of joint 1 [m]
   };
   struct Elbow {
-    double upper, fore;   // lengths of the planar arm [m]
+    double upper, fore;   // lengths of the planar arm's links [m]
     double zero2, zero3;  // angles of the planar arm at q = 0
-    double sign3;         // of axis 3 along axis 2
+    double sign3;         // +1 if axis 3 points along axis 2, else −1
   };
   struct Wrist {
-    Eigen::Matrix3d from_fore;            // axes of the forearm to those of the wrist: z along axis 4, axis 5 in x, z
-    double c45, s45, c56, s56;            // of the angles between the axes
-    double c_sum, s_sum, c_diff, s_diff;  // of half their sum and half their difference
-    double zero5;                         // angle of the spherical triangle at q = 0
-    bool perpendicular;                   // axis 5 to 4 and to 6
+    Eigen::Matrix3d from_fore;            // axes of the forearm (x along the forearm, z along axis 2) to those of {4}
+    double c45, s45, c56, s56;            // cosines and sines of α45 and α56
+    double c_sum, s_sum, c_diff, s_diff;  // of half of α45 + α56, and half of α45 − α56
+    double zero5;                         // from x of {5a} to x of {5b} about axis 5, at q = 0
+    bool perpendicular;                   // axis 5 is perpendicular to axes 4 and 6
   };
 
   Chain chain_;
   Shoulder shoulder_;
   Elbow elbow_;
   Wrist wrist_;
-  Eigen::Matrix3d tip_;  // in the tip's frame: the wrist centre [m], then x and z of the hand, z along axis 6
-  double reach_;         // of the wrist centre from joint 1's origin, at most [m]
-  double tolerance_;     // what counts as no distance [m]
+  Eigen::Matrix3d tip_;  // in the tip's frame: the wrist centre [m], then x and z of {6}
+  double reach_;         // largest distance of the wrist centre from the origin of joint 1 [m]
+  double tolerance_;     // a distance below the tolerance counts as zero [m]
   SixJoints lower_, upper_;
 };
 

@@ -19,7 +19,7 @@
 
 #include <cstdint>
 
-#include <Eigen/Core>
+#include <sigmaik/types.hpp>
 
 namespace sigmaik {
 
@@ -29,11 +29,12 @@ inline constexpr int kMaxEqualities = 8;     ///< rows of C
 inline constexpr int kMaxInequalities = 32;  ///< rows of G
 
 /// Bounded, so none touches the heap.
-using UnknownVector = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, kMaxUnknowns, 1>;
+using UnknownVector = Eigen::Matrix<double, Eigen::Dynamic, 1, kLayout, kMaxUnknowns, 1>;
 /// One number a row of A, C or G, up to 32.
-using RowVector = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, kMaxObjectives, 1>;
+using RowVector = Eigen::Matrix<double, Eigen::Dynamic, 1, kLayout, kMaxObjectives, 1>;
 /// Rows of A, C or G: up to 32×24.
-using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, kMaxObjectives, kMaxUnknowns>;
+using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor | Eigen::DontAlign,
+                                kMaxObjectives, kMaxUnknowns>;
 
 /// The problem. A part that is empty is absent; the number of unknowns is that of the columns of A, C or G, or the size
 /// of the bounds.

@@ -144,7 +144,7 @@ class LimitTracker {
   std::array<Joint, kMaxJoints> joints_{};
   // The same by kind, for joints far from all limits, which is most of them, most of the time. Acceleration is infinite
   // where there is more to it.
-  using Numbers = Eigen::Array<double, kMaxJoints, 1>;
+  using Numbers = Eigen::Array<double, kMaxJoints, 1, kLayout>;
   Numbers lower_, upper_, velocity_, acceleration_;
   bool has_jerk_ = false;
   JointVector q_, v_, stop_;

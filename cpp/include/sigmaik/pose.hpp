@@ -25,6 +25,6 @@ Eigen::Vector3d rotation_log_rate(const Eigen::Vector3d& vector, const Eigen::Ve
 Twist pose_error(const Pose& current, const Pose& target) noexcept;
 
 /// Finite, last row 0 0 0 1, and R a rotation (RᵀR = I within 1e-6, det R > 0).
-bool is_pose(const Eigen::Matrix4d& matrix) noexcept;
+bool is_pose(const PoseMatrix& matrix) noexcept;
 
 }  // namespace sigmaik

@@ -58,8 +58,10 @@ class Spectrum {
   std::array<double, kMaxTask> sigma_{};
   // Entries beyond m and n stay zero: sums over them change nothing.
   static constexpr int kPaddedTask = 8;
-  Eigen::Matrix<double, kPaddedTask, kMaxTask> u_ = Eigen::Matrix<double, kPaddedTask, kMaxTask>::Zero();
-  Eigen::Matrix<double, kMaxJoints, kMaxTask> v_ = Eigen::Matrix<double, kMaxJoints, kMaxTask>::Zero();
+  using PaddedU = Eigen::Matrix<double, kPaddedTask, kMaxTask, kLayout>;
+  using PaddedV = Eigen::Matrix<double, kMaxJoints, kMaxTask, kLayout>;
+  PaddedU u_ = PaddedU::Zero();
+  PaddedV v_ = PaddedV::Zero();
 };
 
 }  // namespace sigmaik

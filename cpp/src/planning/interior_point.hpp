@@ -13,6 +13,7 @@
 
 #include <sigmaik/planning/time_optimal.hpp>
 
+#include "../aligned.hpp"
 #include "stages.hpp"
 
 namespace sigmaik::planning::detail {
@@ -286,7 +287,7 @@ void InteriorPoint<W>::convexify() noexcept {
     x.convex = x.hessian;
     const double size = joint_hessian_.cwiseAbs().maxCoeff();
     if (size > 1e-9 * options_.time_weight) {
-      Eigen::SelfAdjointEigenSolver<JointMatrix> eigen(joint_hessian_);
+      Eigen::SelfAdjointEigenSolver<sigmaik::detail::Aligned<JointMatrix>> eigen(joint_hessian_);
       if (eigen.eigenvalues()[0] < 0.0) {
         joint_hessian_ = eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0.0).asDiagonal() *
                          eigen.eigenvectors().transpose();

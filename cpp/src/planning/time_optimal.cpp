@@ -5,6 +5,7 @@
 #include <limits>
 #include <utility>
 
+#include "../aligned.hpp"
 #include "../message.hpp"
 #include "interior_point.hpp"
 
@@ -151,7 +152,7 @@ JointVector TimeOptimal::way_out(const TimeOptimalResult& found) const {
   JointMatrix hessian(n, n);
   cost_->model(node(at), gradient, hessian);
   if (gradient.norm() > 1e-6 * most) return -gradient.normalized();
-  return Eigen::SelfAdjointEigenSolver<JointMatrix>(hessian).eigenvectors().col(0);
+  return Eigen::SelfAdjointEigenSolver<sigmaik::detail::Aligned<JointMatrix>>(hessian).eigenvectors().col(0);
 }
 
 // To stay where one is, which has no interior where that is on a limit.

@@ -28,7 +28,7 @@ struct SphereState {
 };
 
 /// ∂center/∂q, 3×n.
-using PointJacobian = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::ColMajor, 3, kMaxJoints>;
+using PointJacobian = Eigen::Matrix<double, 3, Eigen::Dynamic, kLayout, 3, kMaxJoints>;
 
 /// Spheres that cover an arm. Immutable, safe to use from many threads.
 class ArmSpheres {
