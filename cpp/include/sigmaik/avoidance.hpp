@@ -20,10 +20,11 @@ enum class Avoid {
   Potential,       ///< minus the gradient of the potentials around the known singular sets, near them alone
 };
 
+/// Settings of Avoidance.
 struct AvoidanceOptions {
-  Avoid what = Avoid::None;
-  double gain = 1.0;       ///< ≥ 0, q̇ = gain ∇m or −gain ∇Σφ
-  double max_speed = 0.5;  ///< [rad/s or m/s] > 0, of the fastest joint: longer velocities are shortened to it
+  Avoid what = Avoid::None;  ///< what leads away
+  double gain = 1.0;         ///< ≥ 0, q̇ = gain ∇m or −gain ∇Σφ
+  double max_speed = 0.5;    ///< [rad/s or m/s] > 0, of the fastest joint: longer velocities are shortened to it
   /// η₁ and η₂ of the potentials. They are lower and wider than a planner's, because a velocity must act before the arm
   /// reaches the set: φ is 1 on the set, and e^{-1} at 1/√η₂ = 0.3 rad from the set.
   Potential potential{0.0, 10.0};
@@ -35,6 +36,7 @@ class Avoidance {
   /// \throws Error where an option is out of its range, or potentials are asked for of an arm whose sets are not known
   explicit Avoidance(const Chain& chain, const AvoidanceOptions& options = {});
 
+  /// The settings, as given.
   const AvoidanceOptions& options() const noexcept { return options_; }
   /// Whether velocity() is ever anything but zero.
   bool active() const noexcept { return options_.what != Avoid::None && options_.gain > 0.0; }

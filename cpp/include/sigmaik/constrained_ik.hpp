@@ -67,14 +67,14 @@ struct ConstrainedIkStep {
   JointVector qdot;  ///< (n,) velocity command over the last dt
   /// Ok: the target is met. Damped: not met, and no limit is to blame. Limited: a limit holds the step back. BadInput.
   Status status = Status::BadInput;
-  Twist error = Twist::Zero();       ///< [m, rad] tip minus target, after the step
-  Twist path_error = Twist::Zero();  ///< the same, of the target slowed down by ϑ; equal where ϑ = 0
-  double time_scale = 0.0;           ///< ϑ in [0, 1]: 0 as asked, 1 a complete stop; how hard the step is
-  std::uint16_t active = 0;          ///< bit i: a limit of joint i is active
-  bool torque_active = false;        ///< a torque limit is active, or cannot be met
-  bool error_active = false;         ///< max_error is active, or has been let go
-  bool exact_met = true;             ///< the exact part's linearised equations hold
-  IkSource used = IkSource::Optimised;
+  Twist error = Twist::Zero();          ///< [m, rad] tip minus target, after the step
+  Twist path_error = Twist::Zero();     ///< the same, of the target slowed down by ϑ; equal where ϑ = 0
+  double time_scale = 0.0;              ///< ϑ in [0, 1]: 0 as asked, 1 a complete stop; how hard the step is
+  std::uint16_t active = 0;             ///< bit i: a limit of joint i is active
+  bool torque_active = false;           ///< a torque limit is active, or cannot be met
+  bool error_active = false;            ///< max_error is active, or has been let go
+  bool exact_met = true;                ///< the exact part's linearised equations hold
+  IkSource used = IkSource::Optimised;  ///< where the step comes from
 };
 
 /// Follows a target pose, one step a cycle. Keeps its own reference configuration and reads no measured positions.
@@ -90,7 +90,9 @@ class ConstrainedIk {
   /// One cycle towards a pose of the tip in base. Real time. A target that is not a pose: BadInput, and the arm stops.
   ConstrainedIkStep step(const Pose& target) noexcept;
 
+  /// The arm.
   const Chain& chain() const noexcept { return chain_; }
+  /// The settings, as given.
   const ConstrainedIkOptions& options() const noexcept { return options_; }
   /// Whether the closed form is at hand.
   bool has_analytic() const noexcept { return analytic_.has_value(); }

@@ -41,10 +41,10 @@ namespace sigmaik {
 
 /// Which of a chain's limits a LimitTracker holds, and how an arm comes back that starts outside them.
 struct LimitOptions {
-  bool position = true;
-  bool velocity = true;
-  bool acceleration = true;
-  bool jerk = true;
+  bool position = true;      ///< whether the chain's position limits are held
+  bool velocity = true;      ///< whether the chain's velocity limits are held
+  bool acceleration = true;  ///< whether the chain's acceleration limits are held
+  bool jerk = true;          ///< whether the chain's jerk limits are held
   /// In (0, 1], of the velocity limit: how fast a joint that is outside its position limits must at least come back.
   /// Without a velocity limit: its way back, or 1 mm or 1 mrad if that is more, in 0.1 s.
   double recovery_speed = 0.1;
@@ -58,8 +58,10 @@ const char* to_string(LimitKind kind) noexcept;
 
 /// Interval of each joint's velocity. lower ≤ upper; infinite where nothing limits.
 struct VelocityBounds {
-  JointVector lower, upper;  ///< (n,) [rad/s or m/s]
-  std::array<LimitKind, kMaxJoints> lower_kind{}, upper_kind{};
+  JointVector lower;                               ///< (n,) [rad/s or m/s]
+  JointVector upper;                               ///< (n,) [rad/s or m/s]
+  std::array<LimitKind, kMaxJoints> lower_kind{};  ///< which limit makes each lower bound
+  std::array<LimitKind, kMaxJoints> upper_kind{};  ///< which limit makes each upper bound
 };
 
 /// Follows the command of an arm, q ← q + q̇ dt, and says before each cycle how fast each joint may go.
@@ -108,8 +110,10 @@ class LimitTracker {
   /// Bit i: joint i is outside its position or velocity limits, or too fast to stop inside them.
   std::uint16_t recovering() const noexcept { return recovering_; }
 
+  /// Number n of movable joints.
   int dof() const noexcept { return n_; }
   double dt() const noexcept { return dt_; }  ///< [s]
+  /// The settings, as given.
   const LimitOptions& options() const noexcept { return options_; }
 
  private:

@@ -1,6 +1,6 @@
 #pragma once
 /// \file servo.hpp
-/// Pose or twist in, joint command out, each cycle. The only thing with a history.
+/// A pose or a twist goes in, a joint command comes out, each cycle.
 
 #include <array>
 #include <cstdint>
@@ -20,9 +20,9 @@ namespace sigmaik {
 /// digit.
 ///
 /// Position and velocity limits decide where the arm is heading. Acceleration and jerk limits decide how fast it gets
-/// there: in proportion, all joints together, from the last command towards the new one, so that the tool does not veer
-/// off while it speeds up. Where that would break a limit, as where one joint brakes as hard as it can, the others make
-/// the best of it.
+/// there: all joints change in proportion, from the last command towards the new one, so that the tool keeps its
+/// direction while it speeds up. Where this would break a limit, as where one joint brakes as hard as it can, the other
+/// joints do as much of the twist as possible.
 enum class OnLimit {
   /// Other joints take over: of all that the limits allow, the velocities whose twist is nearest to the rule's, and of
   /// these the nearest to the rule's own, to about 1e-5 of the twist away from singularities. A singular direction
@@ -47,7 +47,7 @@ struct ServoOptions {
   double posture_max_speed = std::numeric_limits<double>::infinity();  ///< [rad/s or m/s] > 0, a joint
   AvoidanceOptions avoid{};  ///< added to the posture's velocity: away from singularities, where the arm is redundant
   LimitOptions limits{};     ///< which of the chain's limits are held; see limits.hpp
-  OnLimit on_limit = OnLimit::Redistribute;
+  OnLimit on_limit = OnLimit::Redistribute;  ///< what gives way where a joint limit would be broken
   /// Rows (vx, vy, vz, ωx, ωy, ωz), in the task's axes, that come before the others where Redistribute cannot do all.
   std::array<bool, 6> exact{};
   double length_scale = 1.0;  ///< [m], see VelocitySolver
@@ -56,9 +56,9 @@ struct ServoOptions {
 
 /// Answer of a cycle. By value, no heap.
 struct ServoStep {
-  JointVector q;     ///< (n,) position command
-  JointVector qdot;  ///< (n,) velocity command over the last dt
-  Status status = Status::BadInput;
+  JointVector q;                         ///< (n,) position command
+  JointVector qdot;                      ///< (n,) velocity command over the last dt
+  Status status = Status::BadInput;      ///< what the cycle did
   Twist pose_error = Twist::Zero();      ///< target minus tip before the step, unshortened; zero for twist commands
   Twist asked_twist = Twist::Zero();     ///< what the rule was given: the twist command, or the pose error's
   Twist achieved_twist = Twist::Zero();  ///< J q̇
@@ -108,8 +108,11 @@ class Servo {
   /// \throws Error where a parameter is out of its range
   void set_method(const Method& method);
 
+  /// The arm.
   const Chain& chain() const noexcept { return chain_; }
+  /// The settings, as given.
   const ServoOptions& options() const noexcept { return options_; }
+  /// The rule.
   const Method& method() const noexcept { return solver_.method(); }
   /// (n,) where the reference stands; empty before reset().
   const JointVector& q() const noexcept { return tracker_.q(); }

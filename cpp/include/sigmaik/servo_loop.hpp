@@ -33,25 +33,28 @@ enum class LoopCommand : std::int8_t {
 
 /// What was done in one cycle.
 struct LoopSample {
-  std::int64_t cycle = 0;  ///< from 0, of those that ran
-  double time = 0.0;       ///< [s] since start()
-  LoopCommand command = LoopCommand::Hold;
+  std::int64_t cycle = 0;                   ///< from 0, of those that ran
+  double time = 0.0;                        ///< [s] since start()
+  LoopCommand command = LoopCommand::Hold;  ///< which command the cycle followed
   int configuration = 0;           ///< what configure() answered when this cycle's servo was given; 0: the first one
   bool restarted = false;          ///< the arm was put where it is: see ServoLoop::configure
   Pose target = Pose::Identity();  ///< of the pose that is followed, else the tip's
   Pose tip = Pose::Identity();     ///< after the step, in base
-  ServoStep step;
+  ServoStep step;                  ///< the servo's answer
 };
 
+/// Counts and times of a loop since its start.
 struct LoopStatistics {
-  std::int64_t cycles = 0;
-  std::int64_t missed = 0;   ///< cycles left out, as their time had passed
-  std::int64_t unread = 0;   ///< samples lost, as nobody read them in time
+  std::int64_t cycles = 0;   ///< cycles done
+  std::int64_t missed = 0;   ///< cycles left out, because their time had passed
+  std::int64_t unread = 0;   ///< samples lost, because no read() came in time
   double worst_delay = 0.0;  ///< [s] from when a cycle was due to its start
   double elapsed = 0.0;      ///< [s] since start(), or from start() to stop()
+  /// Cycles per second [1/s].
   double rate() const noexcept { return elapsed > 0.0 ? static_cast<double>(cycles) / elapsed : 0.0; }
 };
 
+/// Settings of ServoLoop.
 struct ServoLoopOptions {
   int history = 4096;  ///< samples kept for read(), a power of 2
   int priority = 0;    ///< of SCHED_FIFO, 1 to 99; 0 is the ordinary scheduler
@@ -73,6 +76,7 @@ class ServoLoop {
   void start();
   /// Brings the arm to rest, in a second at most, and ends the thread.
   void stop() noexcept;
+  /// Whether the thread runs.
   bool running() const noexcept { return thread_running_.load(std::memory_order_acquire); }
 
   /// From the next cycle on, for `timeout` seconds.
@@ -80,11 +84,13 @@ class ServoLoop {
   void follow(const Pose& target, double timeout);
   /// \param twist [v; ω], base axes, at the tip's origin
   void follow_twist(const Twist& twist, double timeout);
+  /// Stops the arm as fast as its limits allow, until the next command.
   void hold() noexcept;
 
   /// Goes on with another servo of the same arm and dt: other rule, other options. From the next cycle on it takes over
-  /// the motion (Servo::continue_from), or with `restart` starts where it was reset to: for arms that do not exist.
-  /// \return a number, one more each time, by which samples tell it
+  /// the motion (Servo::continue_from), or with `restart` starts where it was reset to.
+  /// `restart` is for simulation only: a real arm would jump.
+  /// \return a number, one more each time, by which samples name their servo
   /// \throws Error where joints or dt differ, or with `restart` the servo has not started
   int configure(Servo next, bool restart = false);
 
@@ -92,8 +98,11 @@ class ServoLoop {
   /// \return how many
   std::size_t read(std::span<LoopSample> out);
 
+  /// Counts and times since the start.
   LoopStatistics statistics() const noexcept;
+  /// Control period [s].
   double dt() const noexcept { return dt_; }
+  /// Number n of movable joints.
   int dof() const noexcept { return dof_; }
 
  private:
