@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 
 import sigmaik as sk
-from sigmaik.experiments.montecarlo import Study, sample_pair
 from sigmaik.planning.time_optimal import time_optimal
+from sigmaik_lab.montecarlo.experiment import MonteCarlo, sample_pair
 
 EQUAL = 1e-4
 """Objectives that differ by less, relatively, are equal."""
@@ -47,7 +47,7 @@ def violation(chain: sk.Chain, plan: sk.planning.Trajectory, start: np.ndarray, 
 
 
 def compare(robot: str, pairs: int, weight: float, avoid: str | None) -> dict[str, Any]:
-    study = Study(robot, pairs, seed=1)
+    study = MonteCarlo(robot, pairs, seed=1)
     chain = study.chain()
     rows = []
     for sample in range(pairs):

@@ -9,6 +9,11 @@ rm -rf build/wheel-check
 cd build/wheel-check
 bin/python -m pip install -q "$wheel"
 
+# Nothing but numpy is there: the command line must do without.
+bin/sigmaik robots >/dev/null
+bin/sigmaik info ufactory_xarm7 --samples 10 >/dev/null
+bin/sigmaik reach --robot ur10 --method dls --limits off --rate 5 --format none --no-plot --out reach >/dev/null
+
 bin/python - <<'PYTHON'
 import pathlib, re, subprocess, sys, sysconfig
 

@@ -6,7 +6,7 @@ import importlib.util
 
 from ._core import Error
 
-__all__ = ["MissingPackage", "need"]
+__all__ = ["MissingPackage", "installed", "need"]
 
 #: What pip calls a module, where the two differ, or where a version is needed.
 _REQUIREMENTS = {"distributed": "'dask[distributed]'", "mujoco": "'mujoco>=3'", "viser": "'viser>=1'"}
@@ -18,7 +18,7 @@ class MissingPackage(Error, ImportError):
 
 def need(*modules: str) -> None:
     """Raises MissingPackage, with the command that installs them, where modules are not installed."""
-    missing = [module for module in modules if not _installed(module)]
+    missing = [module for module in modules if not installed(module)]
     if not missing:
         return
     verb, noun = ("is", "it") if len(missing) == 1 else ("are", "them")
@@ -26,7 +26,8 @@ def need(*modules: str) -> None:
     raise MissingPackage(f"{' and '.join(missing)} {verb} not installed; pip install {command} brings {noun}")
 
 
-def _installed(module: str) -> bool:
+def installed(module: str) -> bool:
+    """Whether a module can be imported; the module is not imported."""
     try:
         return importlib.util.find_spec(module) is not None
     except ImportError:

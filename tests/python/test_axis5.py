@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 
 import sigmaik as sk
-from sigmaik.cli import main
-from sigmaik.experiments import axis5
+from sigmaik_lab.__main__ import main
+from sigmaik_lab.axis5 import experiment as axis5
+from sigmaik_lab.axis5.summary import Summary, summarize
 
 OTHERS = [variant for variant in axis5.VARIANTS if variant != "closed"]
 
@@ -25,11 +26,11 @@ def motion(example: int, **changes: float) -> axis5.Motion:
 
 @functools.cache
 def track(example: int, variant: str, dt: float = 4e-3, **changes: float) -> axis5.Track:
-    return axis5.run(motion(example, **changes), variant, axis5.Settings(dt=dt))
+    return axis5.run(motion(example, **changes), variant, axis5.Axis5Settings(dt=dt))
 
 
-def summary(*args: object, **changes: float) -> axis5.Summary:
-    return axis5.summarize(track(*args, **changes))
+def summary(*args: object, **changes: float) -> Summary:
+    return summarize(track(*args, **changes))
 
 
 # --- the motions
@@ -102,7 +103,7 @@ def test_closed_form_jumps_by_a_quarter_turn_in_the_first_sample(dt):
 @pytest.mark.parametrize("variant", OTHERS)
 def test_limits_are_reached_and_never_broken(example, variant, dt):
     t = track(example, variant, dt)
-    row = axis5.summarize(t)
+    row = summarize(t)
     assert row.speed_beyond == row.acceleration_beyond == 0
     assert max(row.speed_ratio) <= 1.0 + 1e-9
     assert max(row.acceleration_ratio) <= 1.0 + 1e-9
@@ -157,7 +158,7 @@ def test_oscillation_without_beta_grows_with_the_rate():
 
 def test_back_to_the_closed_form_without_a_jerk():
     t = track(1, "constrained")
-    row = axis5.summarize(t)
+    row = summarize(t)
     assert not t.optimised[1]
     assert not t.optimised[-1]
     assert 0.1 < row.optimised < 0.4
@@ -182,7 +183,7 @@ def test_time_scaling_trades_time_for_orientation():
 
 def test_all_exact_keeps_the_path_by_slowing_down():
     t = track(1, "scaled-exact")
-    row = axis5.summarize(t)
+    row = summarize(t)
     assert row.finished
     assert row.max_position_error < 2e-6
     assert row.max_orientation_error < 1e-5
@@ -204,7 +205,7 @@ def test_all_exact_cannot_start_across_the_singularity():
 
 
 def test_runs_repeat_exactly():
-    once, again = (axis5.run(motion(2), "scaled", axis5.Settings()) for _ in range(2))
+    once, again = (axis5.run(motion(2), "scaled", axis5.Axis5Settings()) for _ in range(2))
     for name in ("q", "error", "clock"):
         np.testing.assert_array_equal(getattr(once, name), getattr(again, name))
 
@@ -235,13 +236,13 @@ def test_refuses():
     with pytest.raises(ValueError, match="example must be 1 or 2"):
         axis5.motion(3)
     for variant, settings, message in (
-        ("magic", axis5.Settings(), "no variant 'magic'"),
-        ("closed", axis5.Settings(dt=0.0), "dt must be positive"),
-        ("closed", axis5.Settings(dt=1e-6), "samples are too many"),
-        ("constrained", axis5.Settings(beta=-1.0), "beta"),
-        ("scaled", axis5.Settings(gamma=0.0), "gamma"),
-        ("constrained", axis5.Settings(max_error=0.0), "max_error"),
-        ("constrained", axis5.Settings(iterations=0), "iterations"),
+        ("magic", axis5.Axis5Settings(), "no variant 'magic'"),
+        ("closed", axis5.Axis5Settings(dt=0.0), "dt must be positive"),
+        ("closed", axis5.Axis5Settings(dt=1e-6), "samples are too many"),
+        ("constrained", axis5.Axis5Settings(beta=-1.0), "beta"),
+        ("scaled", axis5.Axis5Settings(gamma=0.0), "gamma"),
+        ("constrained", axis5.Axis5Settings(max_error=0.0), "max_error"),
+        ("constrained", axis5.Axis5Settings(iterations=0), "iterations"),
     ):
         with pytest.raises(ValueError, match=message):
             axis5.run(motion(1), variant, settings)
@@ -252,10 +253,10 @@ def test_refuses():
 
 def test_command(capsys, tmp_path, monkeypatch):
     figure = pytest.importorskip("matplotlib.figure")
-    from sigmaik import plots_axis5
+    from sigmaik_lab.axis5 import figure as axis5_figure
 
-    draw = plots_axis5.axis_figure  # one is enough: they take a second each
-    monkeypatch.setattr(plots_axis5, "axis_figure", lambda t, j: draw(t, j) if j == 3 else figure.Figure())
+    draw = axis5_figure.axis_figure  # one is enough: they take a second each
+    monkeypatch.setattr(axis5_figure, "axis_figure", lambda t, j: draw(t, j) if j == 3 else figure.Figure())
     assert main(["axis5", "--example", "2", "--out", str(tmp_path)]) == 0
     printed = capsys.readouterr().out.splitlines()
     assert pathlib.Path(printed[-1]) == tmp_path / "axis5-example2.png"
@@ -278,7 +279,7 @@ def test_command(capsys, tmp_path, monkeypatch):
 
 def test_command_with_every_option(capsys, tmp_path):
     arguments = "--dt 0.01 --distance 0.1 --duration 1 --offset 2 --beta 2 --gamma 0.01 --max-error inf"
-    arguments += " --iterations 3 --format csv --no-plots"
+    arguments += " --iterations 3 --format csv --no-plot"
     assert main(["axis5", "--example", "1", "--out", str(tmp_path), *arguments.split()]) == 0
     out = capsys.readouterr().out
     assert "0.1 m in 1 s, axis 5 2° from zero, dt = 10 ms" in out
@@ -309,7 +310,7 @@ def test_command_refuses(capsys, tmp_path, arguments, message):
         "axis5",
         "--example",
         "1",
-        "--no-plots",
+        "--no-plot",
         "--format",
         "none",
         "--out",

@@ -9,9 +9,9 @@ import pytest
 
 import sigmaik as sk
 from sigmaik import _core
-from sigmaik.cli import main
-from sigmaik.experiments import cart
 from sigmaik.planning import CartError, cart_motion, cart_trajectory, evaluate_cart_motion, shoulder_cylinder
+from sigmaik_lab.__main__ import main
+from sigmaik_lab.cart import experiment as cart
 
 quadprog = pytest.importorskip("quadprog")
 
@@ -25,7 +25,7 @@ REFERENCE = {
 
 @pytest.fixture(scope="module", params=cart.VARIANTS)
 def taught(request):
-    return cart.experiment(request.param)
+    return cart.load(request.param)
 
 
 def exact(e, **options):
@@ -91,7 +91,7 @@ def test_intervals_are_the_roots(taught):
     [("paper", 3480, (794, 4273), 0.0906), ("fk", 2984, (1042, 4025), 0.1020)],
 )
 def test_linear_law(variant, samples_inside, range_inside, nearest):
-    e = cart.experiment(variant)
+    e = cart.load(variant)
     m = evaluate_cart_motion(e.flange_xy, np.linspace(0.5, 0.75, 5068), 0.2, duration=200.0)
     inside = np.flatnonzero(np.hypot(e.flange_xy[:, 0] - m.x, e.flange_xy[:, 1]) < 0.2)
     assert (m.inside, inside[0], inside[-1]) == (samples_inside, *range_inside)
@@ -331,7 +331,7 @@ def test_bad_arguments(bad):
     [("paper", 19.370, 19.415, (3512, 3571, 58)), ("fk", 5.758, 6.061, (3968, 3984, 17))],
 )
 def test_the_published_descent_ends_inside(variant, penalty, smoothness, inside):
-    e = cart.experiment(variant)
+    e = cart.load(variant)
     m = cart_motion(e.flange_xy, 0.5, 0.75, 0.2, "gradient")
     assert m.iterations == 53707
     assert not m.admissible
@@ -418,13 +418,13 @@ def test_the_arm_arrives_at_the_taught_joints(taught):
 
 
 def test_redundancy_misses_the_taught_joints(taught):
-    run = cart.run(cart.experiment(taught.variant), "redundancy")
+    run = cart.run(cart.load(taught.variant), "redundancy")
     assert np.abs(run.joint_error[1:]).max() > 0.5
     assert run.motion.inside > 0
 
 
 def test_linear_law_is_out_of_reach():
-    run = cart.run(cart.experiment("fk"), "linear")
+    run = cart.run(cart.load("fk"), "linear")
     assert run.followed == pytest.approx(0.380, abs=1e-3)
     assert np.all(np.isnan(run.joint_error))
 
@@ -432,7 +432,7 @@ def test_linear_law_is_out_of_reach():
 @pytest.mark.parametrize("shape", ["line", "arc", "spline"])
 @pytest.mark.parametrize("profile", ["constant", "smooth"])
 def test_several_motions(shape, profile):
-    e = cart.experiment("fk")
+    e = cart.load("fk")
     c = shoulder_cylinder(e.chain)
     middle = np.array([0.62, 0.3, -1.75, 0.8, -0.95, 1.5, 0.1])
     stops = np.array([e.taught[0], middle, e.taught[1], middle])
@@ -468,7 +468,7 @@ def test_several_motions(shape, profile):
 
 def test_the_frame_may_be_turned_upside_down():
     # The same motion with z down: y and z change their signs, and joint 1 turns the other way about z.
-    e = cart.experiment("fk")
+    e = cart.load("fk")
     flip = np.diag([1.0, -1.0, -1.0, 1.0])
     plan = cart_trajectory(e.chain, e.taught, 0.2, mount=flip @ e.mount, durations=200.0, samples=500)
     same = cart_trajectory(e.chain, e.taught, 0.2, mount=e.mount, durations=200.0, samples=500)
@@ -481,7 +481,7 @@ def test_the_frame_may_be_turned_upside_down():
 
 
 def test_trajectory_refusals():
-    e = cart.experiment("fk", 300)
+    e = cart.load("fk", 300)
 
     def refused(match, taught=e.taught, radius=0.2, chain=e.chain, **options):
         with pytest.raises(ValueError, match=match):

@@ -8,8 +8,8 @@ import pytest
 from scipy.optimize import minimize
 
 import sigmaik as sk
-from sigmaik.experiments import cart
 from sigmaik.planning import CartError, cart_motion, cart_motion_plane, evaluate_cart_motion_plane
+from sigmaik_lab.cart import experiment as cart
 
 
 def wave(rng, samples, size=0.4):
@@ -151,7 +151,7 @@ def test_a_pinned_axis_is_the_exact_law(seed):
 
 @pytest.mark.parametrize("variant", cart.VARIANTS)
 def test_the_papers_experiment(variant):
-    e = cart.experiment(variant)
+    e = cart.load(variant)
     one = cart_motion(e.flange_xy, 0.5, 0.75, 0.2, turn=e.turn)
     pinned = cart_motion_plane(e.flange_xy, (0.5, 0), (0.75, 0), 0.2, turn=e.turn, y_range=(0, 0))
     assert np.abs(pinned.xy[:, 0] - one.x).max() < 1e-9
@@ -279,7 +279,7 @@ def test_turned_mirrored_scaled_and_backwards():
 
 
 def test_limits_in_range():
-    e = cart.experiment("paper", 800)
+    e = cart.load("paper", 800)
     keep = (e.flange_xy, (0.5, 0.0), (0.75, 0.0), 0.2)
     free = cart_motion_plane(*keep, turn=e.turn, duration=200.0)
     m = cart_motion_plane(

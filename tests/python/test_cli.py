@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import sigmaik as sk
-from sigmaik.cli import main
+from sigmaik_lab.__main__ import main
 
 WAYPOINTS = "x,y,z,roll,pitch,yaw,duration\n0.4,0,0.4,3.14159265,0,0,1\n0.5,0.1,0.3,3.14159265,0,0,1\n"
 
@@ -217,14 +217,15 @@ def test_output_folder_that_cannot_be(capsys, tmp_path, waypoints):
     assert capsys.readouterr().err.count("\n") == 1
 
 
-@pytest.mark.parametrize(("package", "arguments"), [("rich", ["robots"]), ("matplotlib", ["reach"])])
+@pytest.mark.parametrize(("package", "arguments"), [("mujoco", ["execute", "--no-plot"]), ("matplotlib", ["reach"])])
 def test_missing_extras_are_named(capsys, monkeypatch, package, arguments):
     find = importlib.util.find_spec
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == package else find(name))
-    assert refused(capsys, *arguments) == (f"sigmaik: {package} is not installed; pip install {package} brings it\n")
+    hint = {"mujoco": "'mujoco>=3'"}.get(package, package)
+    assert refused(capsys, *arguments) == f"sigmaik: {package} is not installed; pip install {hint} brings it\n"
 
 
 def test_a_closed_pipe_is_no_error():
-    command = f"{sys.executable} -m sigmaik.cli info ur10 --samples 10 | true"
+    command = f"{sys.executable} -m sigmaik_lab info ur10 --samples 10 | true"
     done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, check=False)
     assert done.stderr == ""

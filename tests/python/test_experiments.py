@@ -11,10 +11,12 @@ import numpy as np
 import pytest
 
 import sigmaik as sk
-from sigmaik import experiments as ex
-from sigmaik.experiments import paths
-from sigmaik.experiments.storage import write_atomically
-from sigmaik.experiments.summary import settling_time
+from sigmaik.files import write_atomically
+from sigmaik_lab import csv_file
+from sigmaik_lab.reach import experiment as ex
+from sigmaik_lab.reach import files, methods, paths
+from sigmaik_lab.reach.settings import ReachSettings
+from sigmaik_lab.reach.summary import Summary, settling_time, summarize
 
 XARM, GEN3, PUMA = "ufactory_xarm7", "kinova_gen3_7dof", "puma560"
 JPARSE_PUBLISHED = "jparse:gain=2,continuous=false"
@@ -28,11 +30,11 @@ def load(robot: str, path: str, **changes: float) -> ex.Experiment:
 @functools.cache
 def drive(robot: str, path: str, method: str, limits: bool = False, **changes: float) -> ex.Run:
     experiment = load(robot, path, **changes)
-    return ex.run(experiment, ex.parse_method(method, experiment.settings), limits)
+    return ex.run(experiment, methods.parse_method(method, experiment.settings), limits)
 
 
-def rows(robot: str, path: str, method: str, limits: bool = False, **changes: float) -> list[ex.Summary]:
-    return ex.summarize(drive(robot, path, method, limits, **changes))
+def rows(robot: str, path: str, method: str, limits: bool = False, **changes: float) -> list[Summary]:
+    return summarize(drive(robot, path, method, limits, **changes))
 
 
 def settled(*args: object, **changes: float) -> list[float]:
@@ -115,13 +117,13 @@ def test_safety_alone_commands_motion_that_the_arm_cannot_do():
 def test_a_larger_singular_gain_leaves_the_singularity_faster():
     experiment = load(XARM, LINE)
     times = [
-        ex.summarize(ex.run(experiment, method))[1].settling_time
-        for method in ex.singular_gain_sweep((0.25, 1.0, 4.0), gamma=0.1)
+        summarize(ex.run(experiment, method))[1].settling_time
+        for method in methods.singular_gain_sweep((0.25, 1.0, 4.0), gamma=0.1)
     ]
     assert np.all(np.diff(times) < 0.0)
 
 
-@pytest.mark.parametrize("method", ex.ALL_METHODS)
+@pytest.mark.parametrize("method", methods.ALL_METHODS)
 def test_speed_limits_hold(method):
     for path in (LINE, ELLIPSE):
         run = drive(XARM, path, method, True)
@@ -153,7 +155,7 @@ def test_gen3_passes_its_internal_singularity_twice_a_cycle():
     run = drive(GEN3, "internal-singularity", "jparse")
     for cycle in range(3):
         assert sign_changes(run.q[run.segment == cycle, 1]) == 2
-    assert all(row.min_inverse_condition < 0.01 for row in ex.summarize(run))
+    assert all(row.min_inverse_condition < 0.01 for row in summarize(run))
 
 
 @pytest.mark.parametrize("limits", [False, True])
@@ -193,7 +195,7 @@ def test_puma_passes_wrist_lock_twice_a_cycle():
     limits = run.experiment.chain.limits
     for cycle in range(3):
         assert sign_changes(run.q[run.segment == cycle, 4]) == 2
-    assert all(row.min_inverse_condition < 1e-3 for row in ex.summarize(run))
+    assert all(row.min_inverse_condition < 1e-3 for row in summarize(run))
     assert np.all((run.q > limits.lower) & (run.q < limits.upper))
 
 
@@ -213,7 +215,7 @@ def test_puma_on_the_line_through_wrist_lock():
 
 @pytest.mark.parametrize("robot", sk.robots.names())
 def test_every_arm_has_a_line(robot):
-    assert LINE in ex.names(robot)
+    assert LINE in paths.names(robot)
     if robot in (XARM, GEN3):
         pytest.skip("has a published one")
     out, home, _ = rows(robot, LINE, "jparse", True)
@@ -222,7 +224,7 @@ def test_every_arm_has_a_line(robot):
     assert home.position_error < 1e-3
 
 
-@pytest.mark.parametrize(("robot", "path"), [(r, p) for r in (XARM, GEN3, PUMA) for p in ex.names(r)])
+@pytest.mark.parametrize(("robot", "path"), [(r, p) for r in (XARM, GEN3, PUMA) for p in paths.names(r)])
 def test_paths_that_move_start_where_the_arm_is(robot, path):
     experiment = load(robot, path)
     assert experiment.path.duration == pytest.approx(sum(s.duration for s in experiment.path.segments))
@@ -241,7 +243,7 @@ def test_urdf_file(tmp_path):
     file.write_text(sk.robots.path(PUMA).read_text())
     experiment = ex.load(str(file), LINE)
     assert experiment.robot == "mine"
-    assert experiment.settings == ex.Settings()
+    assert experiment.settings == ReachSettings()
     limits = experiment.chain.limits
     assert np.all((experiment.start >= limits.lower) & (experiment.start <= limits.upper))
     assert ex.load(str(file), LINE, tip="link_3").chain.dof == 3
@@ -279,7 +281,7 @@ def test_run_is_consistent():
 def test_progress_counts_the_cycles():
     counted = []
     experiment = load(XARM, LINE)
-    ex.run(experiment, ex.parse_method("dls"), progress=counted.append)
+    ex.run(experiment, methods.parse_method("dls"), progress=counted.append)
     assert sum(counted) == experiment.samples
 
 
@@ -303,23 +305,23 @@ def test_deviation_is_the_distance_from_the_line():
 
 
 def test_method_names():
-    assert ex.parse_method("dls:damping=0.8").method.damping == 0.8
-    method = ex.parse_method("jparse:gain_linear=3,continuous=false").method
+    assert methods.parse_method("dls:damping=0.8").method.damping == 0.8
+    method = methods.parse_method("jparse:gain_linear=3,continuous=false").method
     assert (method.gain_linear, method.gain_angular, method.continuous) == (3.0, 1.0, False)
-    assert ex.parse_method("jparse:gain=4").method.gain_angular == 4.0
-    settings = ex.Settings(gamma=0.2, singular_gain=3.0)
-    assert ex.parse_method("jparse", settings).method.gain_linear == 3.0
-    assert ex.parse_method("safety", settings).method.gamma == 0.2
-    assert ex.parse_method("adaptive-dls:rule=manipulability,relative=no").label.startswith("adaptive-dls:rule")
+    assert methods.parse_method("jparse:gain=4").method.gain_angular == 4.0
+    settings = ReachSettings(gamma=0.2, singular_gain=3.0)
+    assert methods.parse_method("jparse", settings).method.gain_linear == 3.0
+    assert methods.parse_method("safety", settings).method.gamma == 0.2
+    assert methods.parse_method("adaptive-dls:rule=manipulability,relative=no").label.startswith("adaptive-dls:rule")
     # Buss and Kim's 45° an update.
-    assert ex.parse_method("sdls", ex.Settings(rate=50.0)).method.max_speed == pytest.approx(12.5 * math.pi)
+    assert methods.parse_method("sdls", ReachSettings(rate=50.0)).method.max_speed == pytest.approx(12.5 * math.pi)
 
 
 def test_lists_of_methods():
-    labels = [m.label for m in ex.parse_methods(["jparse:gain_linear=2,gain_angular=2,dls:damping=0.8", "pinv"])]
+    labels = [m.label for m in methods.parse_methods(["jparse:gain_linear=2,gain_angular=2,dls:damping=0.8", "pinv"])]
     assert labels == ["jparse:gain_linear=2,gain_angular=2", "dls:damping=0.8", "pinv"]
-    assert [m.label for m in ex.parse_methods(["all"])] == list(ex.ALL_METHODS)
-    assert len(ex.parse_methods(["all", "jparse"])) == len(ex.ALL_METHODS)
+    assert [m.label for m in methods.parse_methods(["all"])] == list(methods.ALL_METHODS)
+    assert len(methods.parse_methods(["all", "jparse"])) == len(methods.ALL_METHODS)
 
 
 @pytest.mark.parametrize(
@@ -336,7 +338,7 @@ def test_lists_of_methods():
 )
 def test_wrong_methods(spec, message):
     with pytest.raises(ValueError, match=message):
-        ex.parse_method(spec)
+        methods.parse_method(spec)
 
 
 # --- files
@@ -348,7 +350,7 @@ def test_waypoints_from_files(tmp_path):
         "# two poses\nname, x, y, z, roll, pitch, yaw, duration\n"
         "there, 0.5, 0, 0.4, 3.14159265, 0, 0, 2\n, 0.4, 0.1, 0.3, 0, 0.5, 0, 1.5\n"
     )
-    path = ex.read_waypoints(table)
+    path = paths.read_waypoints(table)
     assert [s.name for s in path.segments] == ["there", "(0.4,0.1,0.3)"]
     assert path.duration == 3.5
     np.testing.assert_allclose(path.segments[0].pose[:3, :3], np.diag([1.0, -1.0, -1.0]), atol=1e-8)
@@ -358,10 +360,10 @@ def test_waypoints_from_files(tmp_path):
     for i, content in enumerate(([numbers], {"waypoints": [dict(zip(paths.COLUMNS, numbers, strict=True), name="a")]})):
         file = tmp_path / f"way{i}.json"
         file.write_text(json.dumps(content))
-        read = ex.read_waypoints(file)
+        read = paths.read_waypoints(file)
         np.testing.assert_allclose(read.segments[0].pose, path.segments[1].pose, atol=1e-15)
     experiment = ex.load(XARM, table, rate=20.0)
-    assert ex.run(experiment, ex.parse_method("jparse")).t.shape == (70,)
+    assert ex.run(experiment, methods.parse_method("jparse")).t.shape == (70,)
 
 
 @pytest.mark.parametrize(
@@ -390,13 +392,13 @@ def test_wrong_waypoints(tmp_path, name, content, message):
     file = tmp_path / name
     file.write_text(content)
     with pytest.raises(ValueError, match=message) as error:
-        ex.read_waypoints(file)
+        paths.read_waypoints(file)
     assert str(file) in str(error.value)
 
 
 def test_waypoints_that_are_not_there(tmp_path):
     with pytest.raises(ValueError, match="No such file"):
-        ex.read_waypoints(tmp_path / "none.csv")
+        paths.read_waypoints(tmp_path / "none.csv")
 
 
 def test_rotation_turns_about_fixed_axes():
@@ -408,7 +410,7 @@ def test_rotation_turns_about_fixed_axes():
 
 def test_saved_runs_read_back(tmp_path):
     run = drive(XARM, LINE, "jparse", True)
-    with np.load(ex.save_run(run, tmp_path / "deep" / "run.npz")) as data:
+    with np.load(files.save_run(run, tmp_path / "deep" / "run.npz")) as data:
         for name in (
             "t",
             "q",
@@ -424,14 +426,14 @@ def test_saved_runs_read_back(tmp_path):
         assert str(data["method"]) == "jparse"
         assert json.loads(str(data["settings"]))["rate"] == 50.0
         assert data["joint_names"].tolist() == list(run.experiment.chain.joint_names)
-    with ex.save_run(run, tmp_path / "run.csv", "csv").open(newline="") as stream:
+    with files.save_run(run, tmp_path / "run.csv", "csv").open(newline="") as stream:
         table = list(csv.DictReader(stream))
     assert len(table) == run.experiment.samples
     assert float(table[7]["q_joint3"]) == run.q[7, 2]
     assert float(table[7]["error_rz"]) == run.pose_error[7, 5]
-    with ex.save_summary(ex.summarize(run), tmp_path / "sum.csv").open(newline="") as stream:
+    with csv_file.save_rows(summarize(run), tmp_path / "sum.csv").open(newline="") as stream:
         summary = list(csv.DictReader(stream))
-    assert [float(row["position_error"]) for row in summary] == [row.position_error for row in ex.summarize(run)]
+    assert [float(row["position_error"]) for row in summary] == [row.position_error for row in summarize(run)]
 
 
 def test_files_are_written_whole_or_not_at_all(tmp_path):
@@ -452,22 +454,24 @@ def test_files_are_written_whole_or_not_at_all(tmp_path):
 
 
 def test_figure(tmp_path):
-    plots = pytest.importorskip("sigmaik.plots")
-    runs = [drive(XARM, LINE, method, limits) for method in ex.ALL_METHODS for limits in (False, True)]
-    figure = plots.experiment_figure(runs)
+    figure_ = pytest.importorskip("sigmaik_lab.reach.figure")
+    from sigmaik._plotting import save_figure
+
+    runs = [drive(XARM, LINE, method, limits) for method in methods.ALL_METHODS for limits in (False, True)]
+    figure = figure_.reach_figure(runs)
     axes = figure.axes
     assert len(axes) == 8
-    assert len(axes[0].get_lines()) >= len(ex.ALL_METHODS)
-    file = plots.save_figure(figure, tmp_path / "a.png")
+    assert len(axes[0].get_lines()) >= len(methods.ALL_METHODS)
+    file = save_figure(figure, tmp_path / "a.png")
     assert 10_000 < file.stat().st_size < 200_000
     assert file.read_bytes().startswith(b"\x89PNG")
 
 
 def test_figure_of_a_line_shows_the_distance_from_it():
-    plots = pytest.importorskip("sigmaik.plots")
+    figure_ = pytest.importorskip("sigmaik_lab.reach.figure")
     run = drive(PUMA, "wrist-lock", "jparse")
-    figure = plots.experiment_figure([run])
+    figure = figure_.reach_figure([run])
     assert len(figure.axes) == 4
     assert "line" in figure.axes[0].get_ylabel()
     with pytest.raises(ValueError, match="no run"):
-        plots.experiment_figure([])
+        figure_.reach_figure([])

@@ -1,5 +1,7 @@
 """What an import loads, and what a missing package says."""
 
+import pathlib
+import re
 import subprocess
 import sys
 
@@ -24,7 +26,16 @@ def test_import_loads_numpy_and_no_command_line():
     tops = {name.partition(".")[0] for name in ours}
     assert "sigmaik" in tops
     assert tops <= {"sigmaik", "numpy"} | set(sys.stdlib_module_names)
-    assert not tops & {"argparse", "concurrent", "multiprocessing", "webbrowser", "xml", "http"}
+    assert not tops & {"argparse", "sigmaik_lab", "concurrent", "multiprocessing", "webbrowser", "xml", "http"}
+
+
+def test_library_knows_nothing_of_the_laboratory():
+    files = list(pathlib.Path(sk.__file__).parent.rglob("*.py"))
+    assert len(files) > 20
+    for file in files:
+        assert not re.search(r"sigmaik_lab|\bimport (argparse|rich)\b|from rich", file.read_text(encoding="utf-8")), (
+            file
+        )
 
 
 def test_planning_and_figures_make_no_circle():

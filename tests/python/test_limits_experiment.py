@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 import sigmaik as sk
-from sigmaik import experiments as ex
-from sigmaik.experiments import limits as limits_
+from sigmaik_lab.csv_file import save_rows
+from sigmaik_lab.limits import experiment as ex
+from sigmaik_lab.reach.methods import parse_method
 
 SHORT = ex.LimitsSettings(rate=500.0, trials=2, seconds=4.0, pace=0.2)
 ROBOTS = ("ufactory_xarm7", "franka_panda", "ur10")
@@ -60,7 +61,7 @@ def test_jerk_limits_hold_where_they_are_given():
 def test_without_limits_and_clamped_they_are():
     none = ex.summarize_limits(drive("ufactory_xarm7", "beyond limits", "none"))
     assert none.position_broken > 0
-    assert none.position_excess == pytest.approx(limits_.BEYOND_LIMIT, abs=0.1)
+    assert none.position_excess == pytest.approx(ex.BEYOND_LIMIT, abs=0.1)
     assert none.limited == none.taken_over == 0.0
     assert none.achieved == pytest.approx(1.0)
     clamp = ex.summarize_limits(drive("ufactory_xarm7", "beyond limits", "clamp"))
@@ -111,8 +112,8 @@ def test_a_figure_by_hand():
         "</joint></robot>"
     ).with_limits(acceleration=10.0)
     settings = ex.LimitsSettings(rate=100.0)
-    trial = limits_.Trial("t", np.zeros(1), np.zeros((4, 6)), (limits_.Phase("drive", 0, 4),))
-    experiment = ex.LimitsExperiment("one", chain, ex.parse_method("jparse"), settings, {"teleoperation": (trial,)})
+    trial = ex.Trial("t", np.zeros(1), np.zeros((4, 6)), (ex.Phase("drive", 0, 4),))
+    experiment = ex.LimitsExperiment("one", chain, parse_method("jparse"), settings, {"teleoperation": (trial,)})
     qdot = np.array([[1.0], [1.0], [0.0], [0.0]])
     q = np.array([[0.0], [0.01], [0.02], [0.02], [0.02]])
     rule = np.tile([0.0, 0.0, 0.0, 0.0, 0.0, 1.0], (4, 1))
@@ -145,7 +146,7 @@ def test_seeds_decide():
 
 def test_twists_saturate():
     twists = load().trials["teleoperation"][0].commands
-    for rows, longest in zip((slice(0, 3), slice(3, 6)), limits_.SATURATION, strict=True):
+    for rows, longest in zip((slice(0, 3), slice(3, 6)), ex.SATURATION, strict=True):
         length = np.linalg.norm(twists[:, rows], axis=1)
         assert length.max() == pytest.approx(longest)
         assert np.mean(length > 0.999 * longest) > 0.1
@@ -195,7 +196,7 @@ def test_wrong_names():
 def test_files(tmp_path):
     traces = drive("ufactory_xarm7", "beyond limits", "scale")
     rows = [ex.summarize_limits(traces)]
-    with ex.save_limits_summary(rows, tmp_path / "a.csv").open(newline="") as stream:
+    with save_rows(rows, tmp_path / "a.csv").open(newline="") as stream:
         table = list(csv.DictReader(stream))
     assert table[0]["variant"] == "scale"
     assert float(table[0]["limited"]) == rows[0].limited
@@ -207,12 +208,14 @@ def test_files(tmp_path):
 
 
 def test_pictures(tmp_path):
-    plots = pytest.importorskip("sigmaik.plots")
+    figures = pytest.importorskip("sigmaik_lab.limits.figure")
+    from sigmaik._plotting import save_figure
+
     for robot, scenario in (("ufactory_xarm7", "beyond reach"), ("ur10", "teleoperation")):
         traces = [drive(robot, scenario, variant)[0] for variant in ("redistribute", "none")]
-        figure = plots.limits_figure(traces, (0.0, 2.0) if scenario == "teleoperation" else None)
+        figure = figures.limits_figure(traces, (0.0, 2.0) if scenario == "teleoperation" else None)
         assert len(figure.axes) == 8
-        file = plots.save_figure(figure, tmp_path / "a.png")
+        file = save_figure(figure, tmp_path / "a.png")
         assert file.read_bytes().startswith(b"\x89PNG")
     with pytest.raises(ValueError, match="no trace"):
-        plots.limits_figure([])
+        figures.limits_figure([])

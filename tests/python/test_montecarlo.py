@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 import sigmaik as sk
-from sigmaik.experiments import montecarlo as mc
-from sigmaik.experiments.montecarlo_paper import PAPER
+from sigmaik_lab.montecarlo import experiment as mc
+from sigmaik_lab.montecarlo.paper import PAPER
 
-STUDY = mc.Study("franka_panda", samples=20, seed=3)
+STUDY = mc.MonteCarlo("franka_panda", samples=20, seed=3)
 
 
 def timeless(rows):
@@ -89,7 +89,7 @@ def test_dask(tmp_path, expected):
         # And by the command, given the address.
         command = ["montecarlo", "--robot", "franka_panda", "--samples", "4", "--no-plot", "--out", str(tmp_path / "b")]
         run = subprocess.run(
-            [sys.executable, "-m", "sigmaik.cli", *command, "--dask", cluster.scheduler_address],
+            [sys.executable, "-m", "sigmaik_lab", *command, "--dask", cluster.scheduler_address],
             capture_output=True,
             text=True,
             timeout=120,
@@ -124,16 +124,16 @@ def test_resumes_after_an_interruption(tmp_path, expected):
     assert mc.run_study(STUDY, file) == rows
     assert file.read_text() == kept
     # More samples are added, none repeated.
-    more = mc.run_study(mc.Study("franka_panda", samples=22, seed=3), file)
+    more = mc.run_study(mc.MonteCarlo("franka_panda", samples=22, seed=3), file)
     assert [row.sample for row in more] == sorted([s for s in range(22)] * 3)
     assert more[: len(rows)] == rows
 
 
 def test_another_study_is_refused(tmp_path):
     file = tmp_path / "a.csv"
-    mc.run_study(mc.Study("franka_panda", samples=1), file)
+    mc.run_study(mc.MonteCarlo("franka_panda", samples=1), file)
     with pytest.raises(ValueError, match="another study"):
-        mc.run_study(mc.Study("franka_panda", samples=1, seed=1), file)
+        mc.run_study(mc.MonteCarlo("franka_panda", samples=1, seed=1), file)
     (tmp_path / "b.csv").write_text("something else\n")
     with pytest.raises(ValueError, match="not the file of a study"):
         mc.run_study(STUDY, tmp_path / "b.csv")
@@ -153,7 +153,7 @@ def test_summary(expected):
 
 
 def test_joints_of_many_turns_are_cut_to_one():
-    chain = mc.Study("comau_racer_7_1_4").chain()
+    chain = mc.MonteCarlo("comau_racer_7_1_4").chain()
     assert (chain.limits.lower[5], chain.limits.upper[5]) == (-math.pi, math.pi)
     assert chain.limits.upper[4] == sk.robots.load("comau_racer_7_1_4").limits.upper[4]
 
@@ -170,11 +170,11 @@ def test_joints_of_many_turns_are_cut_to_one():
 )
 def test_refusals(arguments, text):
     with pytest.raises(ValueError, match=text):
-        mc.Study(**arguments)
+        mc.MonteCarlo(**arguments)
 
 
 def test_command(tmp_path, capsys):
-    from sigmaik.cli import main
+    from sigmaik_lab.__main__ import main
 
     command = ["montecarlo", "--robot", "comau_racer_7_1_4", "--samples", "6", "--jobs", "1", "--out", str(tmp_path)]
     assert main(command) == 0

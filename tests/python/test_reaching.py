@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import sigmaik as sk
-from sigmaik.experiments import reaching as rc
+from sigmaik_lab.reaching import experiment as rc
 
 
 @pytest.mark.parametrize("robot", rc.ROBOTS)
@@ -56,7 +56,7 @@ def test_tasks_are_seeded_and_inside():
 
 
 def test_command(tmp_path, capsys):
-    from sigmaik.cli import main
+    from sigmaik_lab.__main__ import main
 
     command = ["reaching", "--robot", "ur10", "--tasks", "2", "--out", str(tmp_path)]
     assert main(command) == 0

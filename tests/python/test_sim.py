@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import sigmaik as sk
-from sigmaik.cli import main
 from sigmaik.sim import Simulation, execute
+from sigmaik_lab.__main__ import main
 
 pytest.importorskip("mujoco")
 
@@ -290,7 +290,7 @@ def test_bad_commands(panda, plan):
 def test_the_extra_is_named(panda, monkeypatch):
     find = importlib.util.find_spec
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == "mujoco" else find(name))
-    with pytest.raises(Exception, match=r"mujoco is not installed; pip install 'sigmaik\[sim\]' brings it"):
+    with pytest.raises(sk.Error, match="mujoco is not installed; pip install 'mujoco>=3' brings it"):
         Simulation(panda[0])
 
 
@@ -300,25 +300,28 @@ def test_the_extra_is_named(panda, monkeypatch):
 @pytest.fixture(scope="module")
 def reaching():
     """A second at a pose out of reach, and one at a pose well inside."""
-    from sigmaik import experiments as ex
+    from sigmaik_lab.reach import experiment as ex
+    from sigmaik_lab.reach import paths
 
     arm = sk.robots.load("ufactory_xarm7")
     start = np.array(ex.published("ufactory_xarm7").start)
     far, near = arm.pose(start), arm.pose(start)
     far[:3, 3] = (1.0, 0.0, 0.5)
     near[:3, 3] += (0.05, 0.05, 0.05)
-    path = ex.Path("two", (ex.Segment.hold("near", near, 2.0), ex.Segment.hold("far", far, 1.0)))
+    path = paths.Path("two", (paths.Segment.hold("near", near, 2.0), paths.Segment.hold("far", far, 1.0)))
     return ex.load("ufactory_xarm7", path, start=tuple(start))
 
 
 @pytest.mark.parametrize("actuation", ["velocity", "torque"])
 @pytest.mark.parametrize("feedback", ["reference", "measured"])
 def test_reaching_in_physics(reaching, actuation, feedback):
-    from sigmaik import experiments as ex
-    from sigmaik.experiments import physics
+    from sigmaik_lab.physical_arm import PhysicsSettings
+    from sigmaik_lab.reach import experiment as ex
+    from sigmaik_lab.reach import physics
+    from sigmaik_lab.reach.methods import parse_method
 
-    method = ex.parse_method("jparse", reaching.settings)
-    settings = physics.PhysicsSettings(actuation=actuation, feedback=feedback)
+    method = parse_method("jparse", reaching.settings)
+    settings = PhysicsSettings(actuation=actuation, feedback=feedback)
     run = physics.run_physics(reaching, method, True, settings)
     # Without physics it is what `run` gives, to the last digit.
     alone = ex.run(reaching, method, True)
@@ -336,12 +339,13 @@ def test_reaching_in_physics(reaching, actuation, feedback):
 
 def test_the_measured_loop_is_the_servos_law(reaching):
     # Perfect drives at the method's own rate: what is left is that they take time to follow.
-    from sigmaik import experiments as ex
-    from sigmaik.experiments.physics import _Measured
     from sigmaik.sim import Measurement
+    from sigmaik_lab.reach import experiment as ex
+    from sigmaik_lab.reach.methods import parse_method
+    from sigmaik_lab.reach.physics import _Measured
 
     for name in ("jparse", "dls", "pinv"):
-        method = ex.parse_method(name, reaching.settings)
+        method = parse_method(name, reaching.settings)
         for limits in (False, True):
             loop = _Measured(reaching, method, limits)
             run = ex.run(reaching, method, limits)
@@ -355,11 +359,12 @@ def test_the_measured_loop_is_the_servos_law(reaching):
 
 
 def test_drives_trip(reaching):
-    from sigmaik import experiments as ex
-    from sigmaik.experiments import physics
+    from sigmaik_lab.physical_arm import PhysicsSettings
+    from sigmaik_lab.reach import physics
+    from sigmaik_lab.reach.methods import parse_method
 
-    method = ex.parse_method("jparse", reaching.settings)
-    run = physics.run_physics(reaching, method, False, physics.PhysicsSettings(trip=0.2))
+    method = parse_method("jparse", reaching.settings)
+    run = physics.run_physics(reaching, method, False, PhysicsSettings(trip=0.2))
     assert run.tripped > 0.0
     after = run.physical.t > run.tripped
     assert np.array_equal(run.physical.q[after], np.broadcast_to(run.physical.q[-1], run.physical.q[after].shape))

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 import sigmaik as sk
-from sigmaik.experiments import around_table as at
+from sigmaik_lab.round_table import experiment as at
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_free_of_collisions_and_further_from_singularities_with_the_index(seed):
-    scene = at.load_scene(seed)
+    scene = at.load(seed)
     with_index, without = (at.plan(scene, index, seed) for index in (True, False))
     assert with_index.status != "failed"
     assert without.status != "failed"
@@ -28,7 +28,7 @@ def test_by_the_gradient():
     for restarts in (0, 4):
         failed[restarts] = []
         for seed in range(24):
-            scene = at.load_scene(seed)
+            scene = at.load(seed)
             plan = sk.planning.gradient(
                 scene.chain, scene.start, scene.goal, scene.obstacles, spheres=scene.spheres, restarts=restarts
             )
@@ -41,7 +41,7 @@ def test_by_the_gradient():
 
 
 def test_command(tmp_path, capsys):
-    from sigmaik.cli import main
+    from sigmaik_lab.__main__ import main
 
     assert main(["table", "--out", str(tmp_path)]) == 0
     out = capsys.readouterr().out
@@ -51,6 +51,6 @@ def test_command(tmp_path, capsys):
 
 
 def test_scene_is_seeded():
-    one, two = at.load_scene(3), at.load_scene(3)
+    one, two = at.load(3), at.load(3)
     assert np.array_equal(one.start, two.start)
     assert np.array_equal(one.goal, two.goal)

@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 
 import sigmaik as sk
-from sigmaik.cli import main
-from sigmaik.experiments.methods import ALL_METHODS
 from sigmaik.teleop import Episode, Session, Settings, devices, gauges
-from sigmaik.teleop.drill import ROBOTS, drill
+from sigmaik_lab.__main__ import main
+from sigmaik_lab.drill.experiment import ROBOTS, drill
 
 
 def until(condition, seconds=20.0):
@@ -98,7 +97,7 @@ def test_refused_commands_leave_all_as_it_is(session):
 def test_settings_change_without_a_kick(session):
     session.start_recording()
     session.follow(moved(session, 2.0, 0.0, 0.0))
-    changes = [{"method": name} for name in ALL_METHODS]
+    changes = [{"method": name} for name in sk.methods.ALL]
     changes += [{"gamma": 0.3}, {"on_limit": "scale"}, {"mask": (True,) * 3 + (False,) * 3}, {"gain_linear": 15.0}]
     for change in changes:
         session.configure(**change)
@@ -254,7 +253,7 @@ def test_recording_has_a_beginning_an_end_and_a_longest():
 
 def test_every_method_drives_five_arms_through_their_singularities_within_limits():
     rows = drill(seconds=2.0, rate=250.0)
-    assert {(row.robot, row.method) for row in rows} == {(r, m) for r in ROBOTS for m in ALL_METHODS}
+    assert {(row.robot, row.method) for row in rows} == {(r, m) for r in ROBOTS for m in sk.methods.ALL}
     for row in rows:
         assert row.cycles > 100
         assert row.broken == 0, f"{row.robot} {row.method}: {row.episode.broken_limits()}"

@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 
 import sigmaik as sk
-from sigmaik.cli import main
-from sigmaik.experiments import track
-from sigmaik.experiments.methods import parse_method
+from sigmaik_lab.__main__ import main
+from sigmaik_lab.reach.methods import parse_method
+from sigmaik_lab.track import experiment as track
+from sigmaik_lab.track import summary
+from sigmaik_lab.track.camera import Camera
+from sigmaik_lab.track.target import TARGETS, read_recording
 
 
 @pytest.fixture(scope="module")
@@ -101,7 +104,7 @@ def test_servo_refuses_feedforward_that_is_none():
 
 
 def test_targets_start_and_end_at_home_and_at_rest():
-    for target in track.TARGETS:
+    for target in TARGETS:
         e = track.load_track("ur10", target, track.TrackSettings(duration=8.0, rate=200.0))
         home = e.chain.pose(sk.robots.home("ur10"))
         np.testing.assert_allclose(e.poses[[0, -1]], [home, home], atol=2e-3)
@@ -131,12 +134,12 @@ def test_camera_sees_what_it_is_told_to(experiment):
 
 def test_modes_rank_as_they_must(experiment):
     rows = {
-        (mode, feed): track.summarize_track(run(experiment, mode, feed))
+        (mode, feed): summary.summarize_track(run(experiment, mode, feed))
         for mode, feed in (("true", True), ("true", False), ("predict", True), ("interpolate", True), ("raw", False))
     }
     for row in rows.values():
         assert row.broken == 0
-        assert max(row.speed, row.acceleration, row.jerk) <= 1.0 + track.TOLERANCE
+        assert max(row.speed, row.acceleration, row.jerk) <= 1.0 + summary.TOLERANCE
     # Known exactly, the twist fed forward leaves no lag; else it is 1/gain.
     assert abs(rows["true", True].delay) < 0.02
     assert rows["true", False].delay == pytest.approx(0.2, abs=0.05)
@@ -159,13 +162,13 @@ def test_modes_rank_as_they_must(experiment):
 def test_outliers_and_stops(experiment):
     for mode, feed in (("predict", True), ("interpolate", False), ("hold", False)):
         followed = run(experiment, mode, feed)
-        row = track.summarize_track(followed, run(experiment, mode, feed, outliers=False))
+        row = summary.summarize_track(followed, run(experiment, mode, feed, outliers=False))
         assert row.moved_by_outliers < 1e-9
         assert row.drift < 5e-3
         stale = experiment.t[followed.stale]
         assert stale.min() > experiment.gap[0]
         assert stale.max() < experiment.gap[1] + 0.2
-    raw = track.summarize_track(run(experiment, "raw", False), run(experiment, "raw", False, outliers=False))
+    raw = summary.summarize_track(run(experiment, "raw", False), run(experiment, "raw", False, outliers=False))
     assert raw.moved_by_outliers > 5e-3
 
 
@@ -200,7 +203,7 @@ def recording(tmp_path, form):
 @pytest.mark.parametrize("form", ["npz", "csv"])
 def test_recordings(tmp_path, form):
     file, t, poses = recording(tmp_path, form)
-    e = track.load_track("ur10", str(file), camera=track.Camera(gap=None, outliers=0.0))
+    e = track.load_track("ur10", str(file), camera=Camera(gap=None, outliers=0.0))
     assert (e.target, len(e.poses)) == ("hand", 4000)
     np.testing.assert_allclose(e.poses[::50], poses[:-1], atol=1e-9)
     np.testing.assert_allclose(e.poses[:, 1, 3] - poses[0, 1, 3], 0.05 * np.sin(1.5 * e.t), atol=1e-4)
@@ -221,7 +224,7 @@ def test_recordings_refused(tmp_path, text, match):
     file = tmp_path / "bad.csv"
     file.write_text(text)
     with pytest.raises(ValueError, match=match):
-        track.read_recording(file)
+        read_recording(file)
 
 
 # --- the command

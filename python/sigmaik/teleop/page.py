@@ -17,9 +17,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from sigmaik import methods
 from sigmaik._extras import need
 from sigmaik._types import Array
-from sigmaik.experiments import methods
 
 from . import gauges
 from .devices import DEVICES, TwistDevice, open_device
@@ -184,7 +184,7 @@ class Page:
     def _build_rule(self) -> None:
         gui, settings = self._server.gui, self.session.settings
         family = self.session.settings.rule().family
-        names = tuple(methods.SHORT_NAMES)
+        names = methods.ALL
         # As it was given, with parameters, where it has some.
         given = settings.method if settings.method not in names else None
         with gui.add_folder("Rule"):
@@ -394,7 +394,7 @@ class Page:
             return
         task = sample["singular_values"]
         task = task[np.isfinite(task)]
-        title = methods.SHORT_NAMES[rule.family]
+        title = methods.TITLES[rule.family]
         self._status.content = gauges.status_text(
             sample, session.chain, title, session.statistics, session.rate, replaying
         )

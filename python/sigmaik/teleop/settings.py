@@ -9,8 +9,7 @@ from typing import Literal
 from numpy.typing import ArrayLike
 
 import sigmaik as sk
-from sigmaik.experiments import methods
-from sigmaik.experiments import settings as experiment
+from sigmaik import methods
 
 __all__ = ["Settings"]
 
@@ -57,10 +56,15 @@ class Settings:
 
     def rule(self, rate: float = 1000.0) -> methods.NamedMethod:
         """The method at a servo's rate [Hz]."""
-        settings = experiment.Settings(
-            rate=rate, gamma=self.gamma, singular_gain=self.singular_gain, singular_posture=self.singular_posture
-        )
-        return methods.parse_method(self.method, settings)
+        defaults = {
+            "gamma": self.gamma,
+            "gain_linear": self.singular_gain,
+            "gain_angular": self.singular_gain,
+            "singular_posture": self.singular_posture,
+            # Buss and Kim let a joint turn by 45° an update, whatever the update's rate.
+            "max_speed": math.pi / 4.0 * rate,
+        }
+        return methods.parse_named(self.method, defaults)
 
     def servo(self, chain: sk.Chain, dt: float, posture: ArrayLike) -> sk.Servo:
         """A servo with these settings, not started."""

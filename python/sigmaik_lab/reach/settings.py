@@ -1,0 +1,70 @@
+"""Gains, rate and posture of the pose servo, per arm, as the J-PARSE paper's experiments have them.
+
+Figures that the paper does not print come from its authors' public code (github.com/armlabstanford/jparse);
+those chosen here are marked *ours*.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+__all__ = ["ReachSettings", "published"]
+
+
+@dataclass(frozen=True)
+class ReachSettings:
+    """ẋ = [k_p e_p; k_o e_o], e_p shortened to a cap, and a posture q̇ = k_n (q_nominal − q)."""
+
+    rate: float = 50.0  #: [Hz] of the loop
+    gain_linear: float = 5.0  #: k_p [1/s]
+    gain_angular: float = 5.0  #: k_o [1/s]
+    max_position_error: float = 0.5  #: cap on e_p [m]
+    max_orientation_error: float = math.pi  #: cap on e_o [rad]; π is none
+    gamma: float = 0.1  #: γ, threshold on σ_i/σ_max of J-PARSE and its ablations
+    singular_gain: float = 1.0  #: J-PARSE's gain in singular directions, position and orientation
+    singular_posture: bool = False  #: whether the posture acts along J-PARSE's singular directions
+    start: tuple[float, ...] | None = None  #: (n,) [rad] where the arm starts; None: its home
+    posture: tuple[float, ...] | None = None  #: q_nominal (n,) [rad]; None: where the arm starts
+    posture_gain: float = 0.0  #: k_n [1/s]
+    posture_max_speed: float = math.inf  #: cap on each joint's posture speed [rad/s]
+    length_scale: float = 1.0  #: [m], see sigmaik.VelocitySolver; the paper mixes m and rad as they are
+
+    def with_(self, **changes: object) -> ReachSettings:
+        """A copy with the changes that are not None."""
+        return replace(self, **{k: v for k, v in changes.items() if v is not None})  # type: ignore[arg-type]
+
+
+_PUBLISHED = {
+    # "xArm7, simulated". The singular gain is 2 in the authors' launch files; at 1 the rule is continuous.
+    "ufactory_xarm7": ReachSettings(
+        rate=50.0,
+        gain_linear=10.0,
+        gain_angular=10.0,
+        max_position_error=1.0,
+        singular_gain=2.0,
+        start=(-0.0314, -0.5166, 0.1204, 0.9198, -0.0314, 1.4172, 0.0349),
+        posture=(0.0,) * 7,
+        posture_gain=2.0,
+    ),
+    # Gen3, simulated. k_n and the singular gain are those of the authors' main_experiment_kinova.py and its
+    # launch file.
+    "kinova_gen3_7dof": ReachSettings(
+        rate=20.0,
+        gain_linear=1.0,
+        gain_angular=1.0,
+        max_position_error=0.3,
+        singular_gain=2.0,
+        start=(0.0, 0.26, 3.14, -2.27, 0.0, 0.96, 1.57),
+        posture=(0.0, 0.26, 3.14, -2.27, 0.0, 0.96, 1.57),
+        posture_gain=2.0,
+    ),
+    # Rate, gains and cap *ours*: neither the paper nor the code has them. The arm is not redundant: no
+    # posture.
+    "puma560": ReachSettings(rate=50.0, gain_linear=5.0, gain_angular=5.0, max_position_error=0.5, singular_gain=1.0),
+}
+
+
+def published(robot: str) -> ReachSettings:
+    """ReachSettings of the paper's experiments with an arm; for arms that it has not, the defaults (ours)."""
+    return _PUBLISHED.get(robot, ReachSettings())

@@ -1,0 +1,49 @@
+"""How a study is run from the command line."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+from collections.abc import Iterator
+from typing import Any
+
+from sigmaik._extras import need
+
+from . import output
+from .study import study as find
+
+__all__ = ["parsed", "run_study"]
+
+
+def parsed(name: str, words: list[str]) -> argparse.Namespace:
+    """What a study's options are where these words are given."""
+    study = find(name)
+    assert study is not None
+    parser = argparse.ArgumentParser(prog=f"sigmaik {name}")
+    study.options(parser)
+    return parser.parse_args(words)
+
+
+def run_study(name: str, args: argparse.Namespace) -> int:
+    """Loads, runs and reports a study, one experiment after the other. Returns the exit code."""
+    study = find(name)
+    assert study is not None
+    if not getattr(args, "no_plot", True):
+        need("matplotlib")  # told before the run, and not after
+    with _closing(iter(study.load(args))) as experiments:
+        for experiment in experiments:
+            with output.progress(name) as progress:
+                runs = study.run(experiment, progress)
+            output.show(study.report(experiment, runs), args)
+    return 0
+
+
+@contextlib.contextmanager
+def _closing(experiments: Iterator[Any]) -> Iterator[Iterator[Any]]:
+    """A generator's `finally` runs where a run is interrupted."""
+    try:
+        yield experiments
+    finally:
+        close = getattr(experiments, "close", None)
+        if close is not None:
+            close()

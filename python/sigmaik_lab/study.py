@@ -1,0 +1,97 @@
+"""What a study is, and how the command line finds it."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import importlib.util
+import pkgutil
+from collections.abc import Iterable
+from typing import Any, Protocol, TypeVar
+
+from .report import Report
+
+__all__ = ["Command", "Progress", "Study", "command", "describe", "names", "study"]
+
+_PACKAGE = __package__ or "sigmaik_lab"
+
+E = TypeVar("E")
+R = TypeVar("R")
+
+
+class Progress(Protocol):
+    """How far a run is. The command line shows progress as a bar, or as a line now and then."""
+
+    def expect(self, total: float) -> None:
+        """total: all that there is to do, in any unit. May be called again where a study learns more."""
+
+    def say(self, what: str) -> None:
+        """what: is being done from now on."""
+
+    def advance(self, done: float = 1.0) -> None:
+        """done: since the last call."""
+
+
+class Study(Protocol[E, R]):
+    """The functions of a study's `study.py`.
+
+    The folder's `__init__.py` has a docstring and nothing else: the first line is what `sigmaik --help` shows, the rest
+    what `sigmaik NAME --help` does. Files beside `study.py` are the study's own: `experiment.py` computes, `table.py`
+    makes text tables, and `figure.py` draws.
+    """
+
+    def options(self, parser: argparse.ArgumentParser) -> None:
+        """Adds the study's options; those of arm and output with `sigmaik_lab.options`."""
+
+    def load(self, args: argparse.Namespace) -> Iterable[E]:
+        """The experiments that the options ask for, each of which is run and reported before the next one.
+
+        ValueError, before anything is computed, where an option is wrong.
+        """
+
+    def run(self, experiment: E, progress: Progress) -> R:
+        """Computes. Files are the report's, but for one that a long run writes as it goes and resumes from."""
+
+    def report(self, experiment: E, runs: R) -> Report:
+        """What came out: text tables, and files to be written."""
+
+
+class Command(Protocol):
+    """The functions of `command.py` in a folder that is no study: a tool that prints or serves."""
+
+    def options(self, parser: argparse.ArgumentParser) -> None: ...
+
+    def run(self, args: argparse.Namespace) -> int:
+        """Returns the exit code."""
+
+
+def names() -> list[str]:
+    """Of all studies and commands: the folders of this package, with - for _."""
+    package = importlib.import_module(_PACKAGE)
+    return sorted(module.name.replace("_", "-") for module in pkgutil.iter_modules(package.__path__) if module.ispkg)
+
+
+def describe(name: str) -> tuple[str, str]:
+    """The first line of a folder's docstring, and the rest. Nothing but the folder's `__init__.py` is imported."""
+    text = importlib.import_module(_folder(name)).__doc__ or ""
+    first, _, rest = text.strip().partition("\n")
+    return first.rstrip("."), rest.strip()
+
+
+def study(name: str) -> Study[Any, Any] | None:
+    """The study of that name; None where the folder has a command instead."""
+    return _module(name, "study")  # type: ignore[no-any-return]
+
+
+def command(name: str) -> Command | None:
+    """The command of that name; None where the folder has none."""
+    return _module(name, "command")  # type: ignore[no-any-return]
+
+
+def _folder(name: str) -> str:
+    return f"{_PACKAGE}.{name.replace('-', '_')}"
+
+
+def _module(name: str, file: str) -> Any:
+    module = f"{_folder(name)}.{file}"
+    return importlib.import_module(module) if importlib.util.find_spec(module) else None
