@@ -6,9 +6,10 @@ import argparse
 import inspect
 import io
 import os
+import pathlib
+import re
 import subprocess
 import sys
-import textwrap
 
 import pytest
 
@@ -107,44 +108,13 @@ def test_arm_and_output_are_asked_for_in_the_same_words(name):
 
 
 def test_a_new_study_is_one_folder(tmp_path):
+    """The example of CONTRIBUTING.md, as it stands."""
+    text = (pathlib.Path(__file__).parents[2] / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    example = re.search(r"^### A study: 1 folder$.*?^```python$\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
     folder = tmp_path / "sigmaik_lab" / "tiny_wobble"
     folder.mkdir(parents=True)
-    (folder / "__init__.py").write_text('"""how an arm wobbles\n\nTurns joint 1 to and fro.\n"""\n')
-    (folder / "study.py").write_text(
-        textwrap.dedent(
-            """
-            from sigmaik_lab.csv_file import save_csv
-            from sigmaik_lab.options import add_arm, add_output, open_arm
-            from sigmaik_lab.report import Csv, Report, Table
-
-            def options(parser):
-                add_arm(parser, "ur10")
-                parser.add_argument("--times", type=int, default=2)
-                add_output(parser, "out", plots=False)
-
-            def load(args):
-                if args.times < 1:
-                    raise ValueError("--times must be positive")
-                return [(open_arm(args), args.times)]
-
-            def run(asked, progress):
-                arm, times = asked
-                progress.expect(times)
-                reach = []
-                for k in range(times):
-                    reach.append(float(arm.chain.pose(arm.home + 0.1 * k)[2, 3]))
-                    progress.advance()
-                return reach
-
-            def report(asked, runs):
-                table = Table(f"{asked[0].name} wobbles", "time")
-                table.add_numbers("height")
-                for k, height in enumerate(runs):
-                    table.add_row(str(k), f"{height:.3f}")
-                return Report([table], [Csv("wobble", lambda file: save_csv(file, ["height"], [[h] for h in runs]))])
-            """
-        )
-    )
+    (folder / "__init__.py").write_text('"""how an arm wobbles\n\nTurns all joints a little.\n"""\n')
+    (folder / "study.py").write_text(example[1], encoding="utf-8")
     done = plain("--help", path=tmp_path)
     assert done.returncode == 0
     assert "tiny-wobble" in done.stdout
