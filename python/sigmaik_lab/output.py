@@ -1,4 +1,4 @@
-"""How the command line speaks: text and tables on stdout, progress on stderr, files in the folder of --out."""
+"""Output of all commands: text and tables on stdout, progress on stderr, files in the folder of --out."""
 
 from __future__ import annotations
 
@@ -30,8 +30,7 @@ _EVERY = 10.0
 
 
 def say(text: str | Table = "") -> None:
-    """Prints a text, its lines wrapped at the terminal's width, or a table: by rich where rich is installed, and plain
-    where it is not."""
+    """Prints a text, wrapped at the terminal's width, or a table: by rich where rich is installed, else plain."""
     if isinstance(text, Table) and installed("rich"):
         from rich.console import Console
 
@@ -66,7 +65,7 @@ def show(report: Report, args: argparse.Namespace) -> None:
 
 
 def _write(kind: type, files: Sequence[File], folder: pathlib.Path, form: str) -> list[tuple[str, str]]:
-    """Writes files of a kind. Returns what they are, and where: many files share a line."""
+    """Writes files of one kind. Returns pairs of a word and a path; many files share one pair."""
     for file in files:
         if isinstance(file, Series):
             file.save(folder / f"{file.stem}.{form}", form)
@@ -95,7 +94,7 @@ def _many(files: Sequence[File], folder: pathlib.Path, suffix: str) -> str:
 
 @contextlib.contextmanager
 def progress(name: str) -> Iterator[Progress]:
-    """How far a run is: a bar where stderr is a terminal and rich is installed, else a line every ten seconds."""
+    """Shows progress: a bar where stderr is a terminal and rich is installed, else a line every ten seconds."""
     if not (sys.stderr.isatty() and installed("rich")):
         yield Lines(name, sys.stderr)
         return
@@ -122,7 +121,7 @@ class _Bar:
 
 
 class Lines:
-    """Progress as lines, none in the first `every` seconds: a short run says nothing."""
+    """Progress as lines. The first line comes after `every` seconds, so that a short run prints none."""
 
     def __init__(
         self, name: str, stream: TextIO, every: float = _EVERY, clock: Callable[[], float] = time.monotonic

@@ -1,4 +1,4 @@
-"""What a study has to say: text, tables for the terminal, and files. Nothing here needs a package but sigmaik."""
+"""The answer of a study: text, tables for the terminal, and files. This module needs no package but sigmaik."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Cell:
 
 
 def red(text: str, when: bool = True) -> Cell:
-    """Red where what the text says is bad."""
+    """A text that is red where `when` holds."""
     return Cell(text, "red" if when else "")
 
 
@@ -162,7 +162,7 @@ def _wrapped(line: str, width: int) -> list[str]:
 
 @dataclass(frozen=True)
 class Series:
-    """A file of time series, of which there are several. The option --format says the format."""
+    """One file of several with time series, in the format of --format."""
 
     stem: str  #: the file's name without its suffix
     save: Callable[[pathlib.Path, str], object]  #: (file, format)
@@ -178,7 +178,7 @@ class Csv:
 
 @dataclass(frozen=True)
 class Picture:
-    """A PNG file, which the option --no-plot leaves out. Nothing is drawn before the file is written."""
+    """A PNG file; --no-plot leaves the file out. `draw` is called when the file is written, and not before."""
 
     stem: str
     draw: Callable[[], Figure]
@@ -189,7 +189,7 @@ File: TypeAlias = Series | Csv | Picture
 
 @dataclass(frozen=True)
 class Report:
-    """What a study prints, and the files that are then written, in this order. Their paths are printed, the last one
+    """Text that is printed, and files that are then written in this order. The files' paths are printed, the last path
     alone on the last line."""
 
     text: Sequence[str | Table]

@@ -1,4 +1,4 @@
-"""What a study is, and how the command line finds it."""
+"""The interface of a study, and how the command line finds studies by name."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ R = TypeVar("R")
 
 
 class Progress(Protocol):
-    """How far a run is. The command line shows progress as a bar, or as a line now and then."""
+    """Progress of a run. The command line shows a bar, or prints a line every ten seconds."""
 
     def expect(self, total: float) -> None:
-        """total: all that there is to do, in any unit. May be called again where a study learns more."""
+        """total: the whole work, in any unit. A later call replaces the total."""
 
     def say(self, what: str) -> None:
-        """what: is being done from now on."""
+        """what: the part of the work that begins now."""
 
     def advance(self, done: float = 1.0) -> None:
-        """done: since the last call."""
+        """done: the work since the last call, in the unit of the total."""
 
 
 class Study(Protocol[E, R]):
@@ -50,14 +50,14 @@ class Study(Protocol[E, R]):
         """
 
     def run(self, experiment: E, progress: Progress) -> R:
-        """Computes. Files are the report's, but for one that a long run writes as it goes and resumes from."""
+        """Computes. A run writes no file, except one from which a long run resumes."""
 
     def report(self, experiment: E, runs: R) -> Report:
-        """What came out: text tables, and files to be written."""
+        """Text tables, and files to be written."""
 
 
 class Command(Protocol):
-    """The functions of `command.py` in a folder that is no study: a tool that prints or serves."""
+    """The functions of `command.py`, in a folder of a tool that is no study."""
 
     def options(self, parser: argparse.ArgumentParser) -> None: ...
 
@@ -66,7 +66,7 @@ class Command(Protocol):
 
 
 def names() -> list[str]:
-    """Of all studies and commands: the folders of this package, with - for _."""
+    """Names of all studies and commands: the folders of this package, with - in place of _."""
     package = importlib.import_module(_PACKAGE)
     return sorted(module.name.replace("_", "-") for module in pkgutil.iter_modules(package.__path__) if module.ispkg)
 

@@ -1,4 +1,4 @@
-"""What a track amounts to."""
+"""Limits, errors and smoothness of a track, as numbers."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Summary:
 
 
 def summarize(track: Track) -> Summary:
-    """What a track amounts to."""
+    """Limits, errors and smoothness of a track, as numbers."""
     limits, dt, t = track.motion.chain.limits, track.settings.dt, track.t
     speed, acceleration = np.abs(track.qdot), np.abs(track.qddot)
     speeds, accelerations = speed / limits.velocity, acceleration / limits.acceleration

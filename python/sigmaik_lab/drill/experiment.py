@@ -1,4 +1,4 @@
-"""Arms driven through their singularities, as by a hand on the gizmo, by every method: what the recordings say."""
+"""Every method drives arms through their singularities, as a user does with the gizmo; recordings give the figures."""
 
 from __future__ import annotations
 

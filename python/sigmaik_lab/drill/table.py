@@ -1,4 +1,4 @@
-"""What recordings say, as a text table."""
+"""Figures of recordings, as a text table."""
 
 from __future__ import annotations
 

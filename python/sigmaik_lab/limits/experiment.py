@@ -41,7 +41,7 @@ __all__ = [
     "summarize_limits",
 ]
 
-#: What is compared, and what it is.
+#: Ways to hold limits that the study compares.
 VARIANTS: dict[str, str] = {
     "redistribute": "all limits held, other joints take over",
     "position first": "the same, tool position before orientation (exact)",
@@ -49,7 +49,7 @@ VARIANTS: dict[str, str] = {
     "clamp": "today's practice: each joint clamped to its speed, and stopped at its position limit",
     "none": "the rule alone",
 }
-#: What is driven.
+#: Scenarios that every variant is driven through.
 SCENARIOS: dict[str, str] = {
     "beyond reach": "a target 0.5 m out of reach: held, wandering, released",
     "beyond limits": "poses of configurations 0.3 rad beyond a limit: held, left",
@@ -57,19 +57,19 @@ SCENARIOS: dict[str, str] = {
 }
 
 BEYOND_REACH = 0.5  #: [m]
-#: [rad or m] as far inside a joint limit as the arm starts, and beyond it as the pose asks.
+#: [rad or m] distance from the joint limit: of the start inside the limit, and of the target's configuration beyond it.
 BEYOND_LIMIT = 0.3
 SATURATION = (0.5, 1.5)  #: [m/s, rad/s] longest twists of the teleoperation
 BAND = 1.0  #: [Hz] and slower: what a hand does
-#: A tool that misses this part of the rule's twist does not do what it is told.
+#: A cycle counts as limited where the tool's twist misses a larger part of the rule's twist.
 MISSED = 1e-3
-#: Beyond a limit by less, of the limit, is rounding: that of finite differences.
+#: An excess below this part of the limit is the rounding of finite differences.
 TOLERANCE = 1e-7
 
 
 @dataclass(frozen=True)
 class LimitsSettings:
-    """How the loop runs, and for how long."""
+    """Rate, gains and duration of the loop, and limits that replace those of the arm."""
 
     rate: float = 1000.0  #: [Hz]
     trials: int = 3  #: directions that the target out of reach is tried in
@@ -131,7 +131,7 @@ class LimitsExperiment:
 
 @dataclass(frozen=True)
 class Trace:
-    """What came out of a trial. Sample k is the state before cycle k, and the cycle's command."""
+    """Time series of a trial. Sample k is the state before cycle k, and the command of cycle k."""
 
     experiment: LimitsExperiment
     scenario: str
@@ -182,7 +182,7 @@ class Trace:
 
 @dataclass(frozen=True)
 class LimitsSummary:
-    """A variant in a scenario, all trials together. NaN where there is nothing to say.
+    """A variant in a scenario, all trials together. A figure is NaN where no sample belongs to the figure.
 
     Broken limits are counted per joint and cycle; worst is the largest excess of positions [rad or m], and
     the largest ratio to the limit of the others. What limits cost is measured against the rule alone in the same
@@ -342,7 +342,7 @@ def drive(
     variant: str,
     progress: Callable[[int], None] | None = None,
 ) -> Trace:
-    """Drives a trial. progress: called now and then with the number of cycles since the last call."""
+    """Drives a trial. progress: called with the cycles since the last call, every 500 cycles and at the end."""
     if variant not in VARIANTS:
         raise ValueError(f"no variant '{variant}'; there are {', '.join(VARIANTS)}")
     loop = _clamped if variant == "clamp" else _served
@@ -391,7 +391,8 @@ def _served(experiment: LimitsExperiment, trial: Trial, variant: str, progress: 
 
 
 def _clamped(experiment: LimitsExperiment, trial: Trial, _: str, progress: Callable[[int], None] | None) -> _Loop:
-    """The rule's velocities, each joint clamped to its speed, and to what is left to its position limit."""
+    """The rule's velocities; each joint's velocity is clamped to the speed limit and to the distance from the position
+    limit."""
     chain, dt = experiment.chain, 1.0 / experiment.settings.rate
     limits = chain.limits
     lower, upper, speed = limits.lower, limits.upper, limits.velocity
@@ -476,7 +477,7 @@ def summarize_limits(traces: Sequence[Trace]) -> LimitsSummary:
     achieved = np.concatenate([t.achieved for t in traces])
     asked = np.linalg.norm(rule[:, :3], axis=1)
     moved = np.linalg.norm(achieved[:, :3], axis=1)
-    # Of velocities near 0 the direction means nothing.
+    # The direction of a velocity near zero is rounding.
     judged = limited & (asked > 1e-3) & (moved > 1e-4)
     along = np.sum(rule[:, :3] * achieved[:, :3], axis=1)[judged] / (asked * moved)[judged]
     angle = np.arccos(np.clip(along, -1.0, 1.0))
@@ -529,7 +530,7 @@ def _broken(ratios: Sequence[Array]) -> int:
 
 
 def _along(achieved: Array, rule: Array) -> Array:
-    """(N, 6) the rule's twists, scaled to what of them was achieved."""
+    """(N, 6) the projections of the achieved twists on the rule's twists."""
     whole = np.maximum(np.sum(rule * rule, axis=1, keepdims=True), 1e-300)
     along: Array = np.sum(rule * achieved, axis=1, keepdims=True) / whole * rule
     return along

@@ -63,7 +63,7 @@ def cost_table(rows: Sequence[LimitsSummary]) -> Table:
 
 
 def hold_table(rows: Sequence[LimitsSummary]) -> Table:
-    """How still a hold was, and how the arm came back after the release."""
+    """Motion during a hold, and the return of the arm after the release."""
     table = _limits_table("hold and release")
     table.add_numbers(
         "error\nmm",

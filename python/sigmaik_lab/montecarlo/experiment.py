@@ -52,7 +52,7 @@ CHUNK = 8
 
 @dataclass(frozen=True)
 class MonteCarlo:
-    """What a study is made of. Two studies with equal fields have equal samples."""
+    """All settings of a study. Two studies with equal settings have equal samples."""
 
     robot: str = "kuka_lbr_iiwa_14_r820"
     """A shipped arm or a URDF file; without known singular sets there is no objective "potential"."""
@@ -87,11 +87,11 @@ class MonteCarlo:
 
     @property
     def name(self) -> str:
-        """Of the arm."""
+        """Name of the arm."""
         return sk.robots.open(self.robot, self.base, self.tip).name
 
     def chain(self) -> sk.Chain:
-        """The arm; joints that can turn more than twice are cut to one turn: many turns are another study."""
+        """The arm. The range of a joint that turns more than twice is cut to one turn: many turns are another study."""
         chain = sk.robots.open(self.robot, self.base, self.tip).chain
         wide = chain.limits.upper - chain.limits.lower > 4.0 * math.pi + 1e-6
         return chain.with_limits(
@@ -307,7 +307,7 @@ def _line(row: Row) -> str:
 
 
 def _resume(study: MonteCarlo, file: pathlib.Path) -> list[Row]:
-    """Rows of whole samples, after the file has been cut to them, or begun."""
+    """Rows of complete samples. The file is begun, or cut to these rows."""
     header = _header(study)
     if not file.exists() or file.stat().st_size == 0:
         file.parent.mkdir(parents=True, exist_ok=True)
@@ -358,7 +358,7 @@ def _parse(kind: object, text: str) -> int | float | str:
     return text if kind == "str" else int(text) if kind == "int" else float(text)
 
 
-# --- what comes out
+# --- summary
 
 
 @dataclass(frozen=True)
@@ -392,11 +392,11 @@ class Summary:
     unavoidable: float
     """Part of the samples with a crossing that no path could do without"""
     avoidable: float
-    """Part of the samples with another one"""
+    """Part of the samples with an avoidable crossing"""
 
 
 def summarize_study(rows: Sequence[Row]) -> list[Summary]:
-    """A summary an objective, in the order in which they first come; failed samples count, and no more."""
+    """A summary per objective, in the order of the rows. Failed samples are counted, and enter no mean."""
     return [
         _summary(objective, [row for row in rows if row.objective == objective])
         for objective in dict.fromkeys(row.objective for row in rows)

@@ -28,7 +28,7 @@ __all__ = ["Job", "load", "options", "report", "run"]
 
 @dataclass(frozen=True)
 class Job:
-    """A study of one arm, the file that the study goes on from, and who computes."""
+    """A study of one arm, the file from which the study resumes, and the executor of the work."""
 
     study: MonteCarlo
     file: pathlib.Path

@@ -1,4 +1,4 @@
-"""The closed loop: a servo driven along a path, and what it did, sample by sample.
+"""The closed loop: a servo follows a path, and every sample is recorded.
 
     from sigmaik_lab.reach.methods import parse_method
     from sigmaik_lab.reach.experiment import load, run
@@ -62,7 +62,7 @@ class Experiment:
 
 @dataclass(frozen=True)
 class Run:
-    """What a method did. Sample k is the state at t[k], and the command from there to the next."""
+    """Time series of a method. Sample k is the state at t[k], and the command from t[k] to the next sample."""
 
     experiment: Experiment
     method: NamedMethod
@@ -154,7 +154,7 @@ def run(
     velocity_limits: bool = False,
     progress: Callable[[int], None] | None = None,
 ) -> Run:
-    """Runs the loop: a kinematic simulation, in which the arm does what it is told for 1/rate (Euler).
+    """Runs the loop: a kinematic simulation, in which the arm moves at the commanded velocity for 1/rate (Euler).
 
     velocity_limits: hold the arm's joint speed limits by slowing all joints together; False is as published
     progress: called with the number of cycles done since the last call, about ten times a second of simulated

@@ -1,4 +1,4 @@
-"""Where the tip is sent: waypoints that are held for a time, and slow sines along a line.
+"""Paths of the tip: waypoints that are held for a time, and slow sines along a line.
 
 Positions in m and rotations in the base frame; roll, pitch, yaw [rad] turn about the fixed axes x, y, z in
 that order (R = Rz(yaw) Ry(pitch) Rx(roll), as in URDF).

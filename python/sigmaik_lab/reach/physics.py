@@ -139,7 +139,7 @@ class _Measured:
         self._chain, self._settings = chain, s
         self._solver = sk.VelocitySolver(method.method, length_scale=s.length_scale)
         self._limits = chain.limits.velocity if velocity_limits else np.full(chain.dof, math.inf)
-        # Of a continuous joint's posture, the turn that is nearest to the start.
+        # A continuous joint has many equal postures: take the turn nearest to the start.
         turning = np.array(chain.joint_types) == "continuous"
         turns = np.round((experiment.posture - experiment.start) / (2.0 * math.pi))
         self._posture = experiment.posture - np.where(turning, 2.0 * math.pi * turns, 0.0)
@@ -161,7 +161,7 @@ class _Measured:
         return scale * answer.qdot, int(status), scale
 
 
-# --- what it amounts to
+# --- summary
 
 
 @dataclass(frozen=True)

@@ -66,5 +66,5 @@ _PUBLISHED = {
 
 
 def published(robot: str) -> ReachSettings:
-    """ReachSettings of the paper's experiments with an arm; for arms that it has not, the defaults (ours)."""
+    """Settings of the paper's experiments with an arm; defaults (ours) for arms that are not in the paper."""
     return _PUBLISHED.get(robot, ReachSettings())

@@ -1,4 +1,4 @@
-"""What a run amounts to, per waypoint."""
+"""Errors, speeds and times of a run, per waypoint."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a run amounts to, as a text table."""
+"""The summaries of runs as a text table."""
 
 from __future__ import annotations
 

@@ -47,7 +47,7 @@ def see(poses: Array, rate: float, seed: int, camera: Camera, gap: tuple[float, 
     frames = []
     for i in range(math.floor((len(poses) - 1) / rate * camera.rate) + 1):
         stamp = i / camera.rate
-        # All is drawn for every picture, so that the same pictures are missing whatever the others show.
+        # Every picture draws all random numbers, so that the missing pictures do not depend on the other options.
         noise, turn = rng.normal(size=3), rng.normal(size=3)
         missing, wrong, flipped = rng.random(3)
         off, axis = rng.normal(size=3), rng.normal(size=3)

@@ -38,7 +38,7 @@ __all__ = [
 ]
 Bools = NDArray[np.bool_]
 
-#: How samples become targets.
+#: Ways to make targets of samples.
 MODES: dict[str, str] = {
     "true": "the target's pose and twist, known without a camera: the bound",
     "raw": "each sample goes to the servo as it comes, and stays until the next",
@@ -49,13 +49,13 @@ MODES: dict[str, str] = {
 START = 1.0  #: [s] that are not judged: the servo's soft start
 #: [s] that are not judged after the gap, and after the target was out of reach: the way back to it.
 RETURN = 2.0
-#: The least limits that are missing are given: arms' descriptions seldom have jerk, and some no acceleration.
+#: Limits for joints whose description has none: few descriptions have jerk limits, and some no acceleration limits.
 ACCELERATION, JERK = 20.0, 1000.0
 
 
 @dataclass(frozen=True)
 class TrackSettings:
-    """How the loop runs, and for how long."""
+    """Rate, gains and duration of the loop, filters of the stream, and limits that replace those of the arm."""
 
     rate: float = 1000.0  #: [Hz]
     duration: float = 20.0  #: [s]; of a recording, all of it
@@ -128,7 +128,7 @@ class Variant:
 
 @dataclass(frozen=True)
 class Follow:
-    """What came out. Sample k is the state before cycle k, and the cycle's command."""
+    """Time series of a variant. Sample k is the state before cycle k, and the command of cycle k."""
 
     experiment: TrackExperiment
     variant: Variant
@@ -230,7 +230,7 @@ def load_track(
 
 
 def follow(e: TrackExperiment, variant: Variant, progress: Callable[[int], None] | None = None) -> Follow:
-    """Follows the target. progress: called now and then with the number of cycles since the last call."""
+    """Follows the target. progress: called with the number of cycles since the last call, every 1000 cycles."""
     if variant.mode not in MODES:
         raise ValueError(f"no mode '{variant.mode}'; there are {', '.join(MODES)}")
     s, camera = e.settings, e.camera

@@ -1,4 +1,4 @@
-"""What a variant amounts to."""
+"""Errors, motion and events of a variant, as numbers."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from .experiment import Follow
 __all__ = ["TrackSummary", "summarize_track"]
 
 BACK = 0.1  #: [m]: so near the tip is back, whatever its lag
-#: Beyond a limit by less, of the limit, is rounding: that of finite differences.
+#: An excess below this part of the limit is the rounding of finite differences.
 TOLERANCE = 1e-7
 
 
 @dataclass(frozen=True)
 class TrackSummary:
-    """One variant. NaN where there is nothing to say. Errors are against the true target, where judged."""
+    """One variant. A figure without samples is NaN. Errors are against the true target, where judged."""
 
     method: str
     mode: str

@@ -16,7 +16,7 @@ from sigmaik_lab.reach.paths import make_pose, rotation_rpy
 
 __all__ = ["TARGETS", "play", "reachable_poses", "read_recording", "scripted"]
 
-#: Names of targets, and what they are. All begin and end at the arm's home, and at rest.
+#: Scripted targets. Every target begins and ends at the arm's home, and at rest.
 TARGETS: dict[str, str] = {
     "marker": "hand-held: wanders and turns, goes 0.15 m out of reach, and comes back",
     "circle": "0.1 m of radius, upright, across the arm's plane",
@@ -25,7 +25,7 @@ TARGETS: dict[str, str] = {
     "out-and-back": "straight out, 0.15 m beyond reach, and back",
 }
 BEYOND = 0.15  #: [m] out of reach
-#: Within reach is what a servo without limits of speed comes this close to [m, rad].
+#: A pose is within reach where a servo without speed limits comes this close to the pose [m, rad].
 NEAR = (2e-3, 1e-2)
 
 
@@ -73,7 +73,7 @@ def _step(u: Array) -> Array:
 
 
 def _wander(rng: np.random.Generator, t: Array, columns: int) -> Array:
-    """Smooth motion (N, columns) about 0, of variance near 1: what a hand does, at 0.1 to 0.7 Hz."""
+    """Smooth motion (N, columns) about zero with a variance near 1, at the 0.1 to 0.7 Hz of a human hand."""
     frequency = rng.uniform(0.1, 0.7, size=(8, columns))
     phase = rng.uniform(0.0, 2.0 * math.pi, size=(8, columns))
     waves: Array = np.sin(2.0 * math.pi * frequency * t[:, None, None] + phase).sum(axis=1) / 2.0
@@ -138,7 +138,7 @@ def play(times: Array, poses: Array, t: Array) -> Array:
 
 
 def _reach_test(chain: sk.Chain, home: Array) -> Callable[[Array], bool]:
-    """Whether a servo that knows position limits alone, and has all the time it needs, comes near a pose from home."""
+    """A test whether a servo with position limits alone, and with time to settle, reaches a pose from home."""
     servo = sk.Servo(
         chain, sk.JParse(gamma=0.02), dt=0.05, gain_linear=10.0, gain_angular=10.0, soft_start=0.0,
         velocity_limits=False, acceleration_limits=False, jerk_limits=False,
