@@ -23,7 +23,7 @@ docs: .venv/.docs .venv/.test .venv/.package  ## the documentation site, in buil
 	@tools/setup_system.sh $(PYTHON) doxygen
 	mkdir -p build/docs
 	doxygen docs/Doxyfile
-	$(BIN)/python -m sphinx -q -W --keep-going -c docs -d build/docs/doctrees . build/docs/html
+	$(BIN)/python -m sphinx -q -E -W --keep-going -c docs -d build/docs/doctrees . build/docs/html
 	$(BIN)/python -m pytest tests/docs
 
 lint: .venv/.test  ## format, style, types, spelling, and what the repository says of itself
