@@ -228,6 +228,14 @@ def test_studies_take_any_urdf(command, mine, tmp_path, capsys):
     assert "mine" in printed
 
 
+def test_execute_takes_any_urdf(mine, tmp_path, capsys):
+    pytest.importorskip("mujoco")
+    assert (
+        main(["execute", "--robot", mine, "--tip", "flange", "--pace", "0.5", "--no-plot", "--out", str(tmp_path)]) == 0
+    )
+    assert capsys.readouterr().out.splitlines()[-1] == str(tmp_path / "mine-execute.csv")
+
+
 def test_drill_takes_any_urdf(mine, capsys):
     assert main(["drill", "--robot", mine, "--tip", "flange", "--seconds", "0.3"]) == 0
     assert "mine" in capsys.readouterr().out
