@@ -365,6 +365,14 @@ def test_gauges_say_what_a_sample_says(session):
     assert joints.count("<span") == 2 * 7
 
 
+def test_the_page_shows_a_status_that_it_has_no_words_for(session, monkeypatch):
+    monkeypatch.setattr(gauges, "_WORDS", {})
+    monkeypatch.setattr(gauges, "_COLOURS", {})
+    sample = latest(session)
+    text = gauges.status_text(sample, session.chain, "J-PARSE", session.statistics, session.rate)
+    assert sk.Status(int(sample["status"])).name.lower() in text
+
+
 def test_links_without_meshes_get_shapes():
     from sigmaik.teleop.drawing import drawable
 

@@ -36,7 +36,7 @@ def status_text(
 ) -> str:
     """Status, the joints that limit, asked and achieved twist, and the servo's rate."""
     status, command = sk.Status(int(sample["status"])), sk.LoopCommand(int(sample["command"]))
-    word = _WORDS[status]
+    word = _WORDS.get(status, status.name.lower().replace("_", " "))
     if command is sk.LoopCommand.STALE:
         word = "holding: the last command is stale"
     if replaying:
@@ -44,7 +44,7 @@ def status_text(
     joints = [name for i, name in enumerate(chain.joint_names) if int(sample["limiting_joints"]) >> i & 1]
     rows = [
         f"<div id='sk-status' data-status='{status.name}' data-command='{command.name}' "
-        f"style='font-size:15px;font-weight:600;color:{_COLOURS[status]}'>{html.escape(word)}</div>",
+        f"style='font-size:15px;font-weight:600;color:{_COLOURS.get(status, _GREY)}'>{html.escape(word)}</div>",
         f"<div>{html.escape(method)}{' · at limits: ' + html.escape(', '.join(joints)) if joints else ''}</div>",
     ]
     for label, field in (("asked", "asked_twist"), ("achieved", "achieved_twist")):
