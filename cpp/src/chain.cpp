@@ -1,5 +1,6 @@
 #include <sigmaik/chain.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <set>
 
@@ -11,9 +12,9 @@ namespace {
 using detail::require;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-// Beyond these a number is a slip of the pen or of units, not an arm.
+// A larger number is a mistake or has a wrong unit.
 constexpr double kLargestOffset = 1e6;  // m
-constexpr double kLargestLimit = 1e9;   // rad, rad/s, …: short of infinity, which says "none"
+constexpr double kLargestLimit = 1e9;   // rad, rad/s, …; infinity means "no limit"
 
 std::string label(const Segment& segment) { return "joint '" + segment.joint_name + "'"; }
 
@@ -56,8 +57,8 @@ void check_origin(const Segment& s) {
           s.origin.translation().norm(), " m away, which is absurd");
 }
 
-// A rotation that takes z to `axis` (Duff et al. 2017, "Building an orthonormal basis, revisited"): exact for
-// coordinate axes, the identity for z, and accurate close to −z, where the shortest rotation is not.
+// A rotation from z to `axis` (Duff et al. 2017, "Building an orthonormal basis, revisited"). The rotation is exact for
+// coordinate axes, the identity for z, and accurate close to −z, where the shortest rotation loses its digits.
 Eigen::Matrix3d from_z(const Eigen::Vector3d& axis) {
   const double x = axis.x(), y = axis.y(), z = axis.z();
   const double sign = std::copysign(1.0, z);
@@ -65,6 +66,41 @@ Eigen::Matrix3d from_z(const Eigen::Vector3d& axis) {
   Eigen::Matrix3d r;
   r << 1.0 + sign * x * x * a, b, x, sign * b, sign + y * y * a, y, -sign * x, -y, z;
   return r;
+}
+
+// Normalises a movable joint's axis and clears a continuous joint's position limits. Throws if a value is not usable.
+void prepare_joint(Segment& s) {
+  const double length = s.axis.norm();
+  require(s.axis.allFinite() && length > 1e-9 && length < kLargestOffset, label(s), ": axis (", s.axis.transpose(),
+          ") has no direction");
+  s.axis /= length;
+  if (s.type == JointType::Continuous) {
+    s.lower = -kInfinity;
+    s.upper = kInfinity;
+  }
+  check_limits(s);
+}
+
+// Checks all segments, and prepares the movable joints.
+void prepare(const std::string& base, std::vector<Segment>& segments) {
+  require(!base.empty(), "the base link needs a name");
+  require(!segments.empty(), "a chain needs at least one segment");
+  std::set<std::string> joints, links{base};
+  std::size_t movable = 0;
+  for (Segment& s : segments) {
+    require(!s.joint_name.empty(), "the joint before link '", s.link_name, "' needs a name");
+    require(!s.link_name.empty(), label(s), ": the link that it carries needs a name");
+    require(joints.insert(s.joint_name).second, label(s), ": the name is used twice");
+    require(links.insert(s.link_name).second, label(s), ": link '", s.link_name, "' is used twice");
+    check_origin(s);
+    check_inertia(s);
+    if (s.type == JointType::Fixed) continue;
+    prepare_joint(s);
+    ++movable;
+  }
+  require(movable > 0, "no movable joint between '", base, "' and '", segments.back().link_name, "'");
+  require(movable <= kMaxJoints, movable, " movable joints between '", base, "' and '", segments.back().link_name,
+          "'; at most ", kMaxJoints, " are supported");
 }
 
 }  // namespace
@@ -80,36 +116,10 @@ const char* to_string(JointType type) noexcept {
 }
 
 Chain::Chain(std::string base, std::vector<Segment> segments) {
+  prepare(base, segments);
   auto model = std::make_shared<Model>();
-  require(!base.empty(), "the base link needs a name");
-  require(!segments.empty(), "a chain needs at least one segment");
-
-  std::set<std::string> joints, links{base};
-  std::vector<const Segment*> movable;
-  for (Segment& s : segments) {
-    require(!s.joint_name.empty(), "the joint before link '", s.link_name, "' needs a name");
-    require(!s.link_name.empty(), label(s), ": the link that it carries needs a name");
-    require(joints.insert(s.joint_name).second, label(s), ": the name is used twice");
-    require(links.insert(s.link_name).second, label(s), ": link '", s.link_name, "' is used twice");
-    check_origin(s);
-    check_inertia(s);
-    if (s.type == JointType::Fixed) continue;
-    const double length = s.axis.norm();
-    require(s.axis.allFinite() && length > 1e-9 && length < kLargestOffset, label(s), ": axis (", s.axis.transpose(),
-            ") has no direction");
-    s.axis /= length;
-    if (s.type == JointType::Continuous) {
-      s.lower = -kInfinity;
-      s.upper = kInfinity;
-    }
-    check_limits(s);
-    movable.push_back(&s);
-  }
-  require(!movable.empty(), "no movable joint between '", base, "' and '", segments.back().link_name, "'");
-  require(movable.size() <= kMaxJoints, movable.size(), " movable joints between '", base, "' and '",
-          segments.back().link_name, "'; at most ", kMaxJoints, " are supported");
-
-  const int n = static_cast<int>(movable.size());
+  const auto is_movable = [](const Segment& s) { return s.type != JointType::Fixed; };
+  const int n = static_cast<int>(std::count_if(segments.begin(), segments.end(), is_movable));
   model->dof = n;
   JointLimits& limits = model->limits;
   for (JointVector* v :
@@ -117,7 +127,7 @@ Chain::Chain(std::string base, std::vector<Segment> segments) {
     v->resize(n);
   }
 
-  // Everything between two movable joints becomes one constant transform, in frames whose z is the axis.
+  // All origins between two movable joints become one constant transform, in frames whose z lies along the axis.
   Pose placement = Pose::Identity();
   int i = 0;
   for (const Segment& s : segments) {

@@ -13,8 +13,8 @@ using detail::require;
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr double kFarthest = 1e9;  // [m]: differences, and their squares, stay finite
-constexpr double kSigmas = 4.0;    // of the noise of two samples: not yet motion
+constexpr double kFarthest = 1e9;  // [m]: differences of positions and their squares stay finite
+constexpr double kSigmas = 4.0;    // standard deviations of the noise of two samples that do not count as motion
 
 void check(const char* what, double value, bool zero_allowed) {
   require(std::isfinite(value) && (value > 0.0 || (zero_allowed && value == 0.0)), what, " = ", value,
@@ -30,12 +30,54 @@ void bound(Twist& twist, const TargetStreamOptions& options) noexcept {
   detail::shorten(twist.tail<3>(), options.max_angular_speed);
 }
 
-// p(u) on [0, 1] from 0 to `end` with slopes a and b there, and its derivative in u.
+// Cubic Hermite polynomial p(u) on [0, 1] from 0 to `end` with the slopes a at 0 and b at 1, and its derivative in u.
 void hermite(const Vector3d& end, const Vector3d& a, const Vector3d& b, double u, Vector3d& p,
              Vector3d& slope) noexcept {
   const double v = 1.0 - u;
   p = u * u * (3.0 - 2.0 * u) * end + u * v * v * a - u * u * v * b;
   slope = 6.0 * u * v * end + v * (1.0 - 3.0 * u) * a + u * (3.0 * u - 2.0) * b;
+}
+
+// The difference between the target and the motion, in the chart of the motion's pose, and its rate.
+struct Offset {
+  Twist d = Twist::Zero(), rate = Twist::Zero();
+};
+
+// The offset after dt: d(t) = (d + (ḋ + kd) t) e^(−kt) with k = 1/τ, critically damped; zero if τ = 0.
+Offset decayed(const Offset& from, double dt, const TargetStreamOptions& options) noexcept {
+  Offset to;
+  if (!(options.smoothing > 0.0 && dt < 700.0 * options.smoothing)) return to;  // e^(−700) is no normal number
+  const double k = 1.0 / options.smoothing, decay = std::exp(-k * dt);
+  const Twist c = from.rate + k * from.d;
+  to.d = decay * (from.d + dt * c);
+  to.rate = decay * (from.rate - k * dt * c);
+  // Bounds the acceleration by the largest speed per τ. The deceleration from a speed v is at most v/(eτ), so the bound
+  // never delays the target's stop.
+  const auto limit = [&](auto part, double largest) {
+    Eigen::Vector3d change = part(to.rate) - part(from.rate);
+    if (detail::length(change) <= k * dt * largest) return;
+    detail::shorten(change, k * dt * largest);
+    part(to.rate) = part(from.rate) + change;
+    part(to.d) = part(from.d) + dt * (part(from.rate) + 0.5 * change);
+  };
+  limit([](auto& x) { return x.template head<3>(); }, options.max_speed);
+  limit([](auto& x) { return x.template tail<3>(); }, options.max_angular_speed);
+  return to;
+}
+
+// Shortens the step from a pose to the next one to the largest speeds; the twist is then that of the shorter step.
+void shorten_step(const Pose& from, double dt, const TargetStreamOptions& options, Pose& next, Twist& twist) noexcept {
+  Twist step = pose_error(from, next);
+  if (detail::length(step.head<3>()) > options.max_speed * dt) {
+    detail::shorten(step.head<3>(), options.max_speed * dt);
+    next.translation() = from.translation() + step.head<3>();
+    twist.head<3>() = step.head<3>() / dt;
+  }
+  if (detail::length(step.tail<3>()) > options.max_angular_speed * dt) {
+    detail::shorten(step.tail<3>(), options.max_angular_speed * dt);
+    next.linear() = normalised(rotation_exp(step.tail<3>()) * from.linear());
+    twist.tail<3>() = step.tail<3>() / dt;
+  }
 }
 
 }  // namespace
@@ -120,7 +162,7 @@ SampleStatus TargetStream::push(double time, const Pose& pose) noexcept {
   if (time > newest.time && reachable(newest, next)) {
     candidates_ = 0;
     ++counts_.accepted;
-    if (time - newest.time > options_.timeout) {  // what it did before says nothing
+    if (time - newest.time > options_.timeout) {  // samples before a gap do not predict the motion after the gap
       start(next);
     } else {
       if (options_.mode == StreamMode::Predict) correct(next);
@@ -130,7 +172,7 @@ SampleStatus TargetStream::push(double time, const Pose& pose) noexcept {
   }
   const SampleStatus refused = time > newest.time ? SampleStatus::Outlier : SampleStatus::OutOfOrder;
   ++(refused == SampleStatus::Outlier ? counts_.outliers : counts_.out_of_order);
-  if (time == newest.time) return refused;  // twice the same says nothing
+  if (time == newest.time) return refused;  // a repeated sample is no evidence of a new place
   const bool agrees = candidates_ > 0 && time > candidate_.time && reachable(candidate_, next);
   candidates_ = agrees ? candidates_ + 1 : 1;
   candidate_ = next;
@@ -155,7 +197,7 @@ void TargetStream::start(const Sample& next) noexcept {
 void TargetStream::extend(const Sample& next) noexcept {
   int at = 0;
   if (options_.mode == StreamMode::Interpolate) {
-    // Of a sensor so fast that the ring would not reach back to what is played, every so manyth sample, and the newest.
+    // Decimate a fast sensor so that the ring still covers `latency`; always keep the newest sample.
     const double least = options_.latency / (0.75 * kHistory);
     at = count_ >= 2 && sample(count_ - 1).time - sample(count_ - 2).time < least ? count_ - 1 : count_;
     if (at == kHistory) {
@@ -175,7 +217,8 @@ void TargetStream::correct(const Sample& next) noexcept {
   ahead.linear() = rotation_exp(dt * twist.tail<3>()) * estimate_.pose.linear();
   const Twist innovation = pose_error(ahead, next.pose);
 
-  // Q = a² [dt⁴/4 dt³/2; dt³/2 dt²], of an acceleration that is constant in dt.
+  // Prediction with the process noise Q = a² [dt⁴/4 dt³/2; dt³/2 dt²] of an acceleration that is constant in dt, then
+  // the Kalman gains of place and velocity.
   const auto gains = [dt](Covariance& p, double noise, double acceleration) {
     const double a = acceleration * dt;
     p.place += dt * (2.0 * p.cross + dt * p.velocity) + 0.25 * a * a * dt * dt;
@@ -199,8 +242,8 @@ void TargetStream::correct(const Sample& next) noexcept {
 
 // Motion -------------------------------------------------------------------------------------------------------------
 
-// At sample i, of the parabola through it and its neighbours: each side's mean twist counts by the other side's time.
-// The first, which is played after a start only, is left from rest.
+// The twist at sample i: the slope of the parabola through sample i and its two neighbours. The mean twist of each side
+// is weighted with the time of the other side. The motion leaves the first sample from rest.
 Twist TargetStream::slope(int i) const noexcept {
   if (i == 0) return Twist::Zero();
   const double before = sample(i).time - sample(i - 1).time;
@@ -214,12 +257,12 @@ Twist TargetStream::slope(int i) const noexcept {
   return twist;
 }
 
-// On from a motion: at its twist for `horizon`, then more slowly, to rest at `timeout`.
+// Extrapolates a motion: with its twist up to `horizon`, then slower, to rest at `timeout`.
 TargetStream::Motion TargetStream::coast(const Motion& from, double seconds) const noexcept {
   const double fade = options_.timeout - options_.horizon;
   double moved = std::max(seconds, -options_.timeout), rate = 1.0;
   if (moved > options_.horizon) {
-    // rate = 1 − 3u² + 2u³
+    // The speed fades as 1 − 3u² + 2u³.
     const double u = fade > 0.0 ? std::min(1.0, (moved - options_.horizon) / fade) : 1.0;
     moved = options_.horizon + fade * u * (1.0 + u * u * (0.5 * u - 1.0));
     rate = 1.0 + u * u * (2.0 * u - 3.0);
@@ -270,63 +313,45 @@ Target TargetStream::at(double time) noexcept {
     last_.status = status(time);
     last_.age = time - sample(count_ - 1).time;
     if (!placed_) {
-      const Motion now = motion(time);
-      last_.pose = now.pose;
-      last_.twist = now.twist;
-      bound(last_.twist, options_);
-      placed_ = true;
+      place(motion(time));
     } else if (dt > 0.0) {
-      const Motion then = motion(time_), now = motion(time);
-      // d takes the motion to the target: the target's pose is exp(d) R, its ω that of exp(d), and exp(d) ω_R.
-      const Twist d = pose_error(then.pose, last_.pose);
-      const Matrix3d turn = rotation_exp(d.tail<3>());
-      Twist rate = last_.twist - then.twist;
-      rate.tail<3>() = rotation_log_rate(d.tail<3>(), last_.twist.tail<3>() - turn * then.twist.tail<3>());
-
-      // d(t) = (d + (ḋ + kd) t) e^(−kt), k = 1/τ
-      Twist left = Twist::Zero(), slower = Twist::Zero();
-      if (options_.smoothing > 0.0 && dt < 700.0 * options_.smoothing) {
-        const double k = 1.0 / options_.smoothing, decay = std::exp(-k * dt);
-        const Twist c = rate + k * d;
-        left = decay * (d + dt * c);
-        slower = decay * (rate - k * dt * c);
-        const auto limit = [&](auto part, double largest) {  // which slowing down, v/(eτ) at most, never meets
-          Eigen::Vector3d change = part(slower) - part(rate);
-          if (detail::length(change) <= k * dt * largest) return;
-          detail::shorten(change, k * dt * largest);
-          part(slower) = part(rate) + change;
-          part(left) = part(d) + dt * (part(rate) + 0.5 * change);
-        };
-        limit([](auto& x) { return x.template head<3>(); }, options_.max_speed);
-        limit([](auto& x) { return x.template tail<3>(); }, options_.max_angular_speed);
-      }
-      const Matrix3d turned = rotation_exp(left.tail<3>());
-      Pose next;
-      next.translation() = now.pose.translation() + left.head<3>();
-      next.linear() = turned * now.pose.linear();
-      Twist twist;
-      twist.head<3>() = now.twist.head<3>() + slower.head<3>();
-      twist.tail<3>() = rotation_exp_rate(left.tail<3>(), slower.tail<3>()) + turned * now.twist.tail<3>();
-
-      Twist step = pose_error(last_.pose, next);
-      if (detail::length(step.head<3>()) > options_.max_speed * dt) {
-        detail::shorten(step.head<3>(), options_.max_speed * dt);
-        next.translation() = last_.pose.translation() + step.head<3>();
-        twist.head<3>() = step.head<3>() / dt;
-      }
-      if (detail::length(step.tail<3>()) > options_.max_angular_speed * dt) {
-        detail::shorten(step.tail<3>(), options_.max_angular_speed * dt);
-        next.linear() = normalised(rotation_exp(step.tail<3>()) * last_.pose.linear());
-        twist.tail<3>() = step.tail<3>() / dt;
-      }
-      bound(twist, options_);
-      last_.pose = next;
-      last_.twist = twist;
+      approach(motion(time_), motion(time), dt);
     }
   }
   time_ = time;
   timed_ = true;
   return last_;
+}
+
+void TargetStream::place(const Motion& now) noexcept {
+  last_.pose = now.pose;
+  last_.twist = now.twist;
+  bound(last_.twist, options_);
+  placed_ = true;
+}
+
+// The target's pose is exp(d) R, where R is the motion's pose and d is the offset. The target's ω is the sum of the
+// rate of exp(d) and exp(d) ω_R.
+void TargetStream::approach(const Motion& then, const Motion& now, double dt) noexcept {
+  Offset offset;
+  offset.d = pose_error(then.pose, last_.pose);
+  const Matrix3d turn = rotation_exp(offset.d.tail<3>());
+  offset.rate = last_.twist - then.twist;
+  offset.rate.tail<3>() = rotation_log_rate(offset.d.tail<3>(), last_.twist.tail<3>() - turn * then.twist.tail<3>());
+
+  const Offset left = decayed(offset, dt, options_);
+  const Matrix3d turned = rotation_exp(left.d.tail<3>());
+  Pose next;
+  next.translation() = now.pose.translation() + left.d.head<3>();
+  next.linear() = turned * now.pose.linear();
+  Twist twist;
+  twist.head<3>() = now.twist.head<3>() + left.rate.head<3>();
+  twist.tail<3>() = rotation_exp_rate(left.d.tail<3>(), left.rate.tail<3>()) + turned * now.twist.tail<3>();
+
+  shorten_step(last_.pose, dt, options_, next, twist);
+  bound(twist, options_);
+  last_.pose = next;
+  last_.twist = twist;
 }
 
 }  // namespace sigmaik

@@ -130,11 +130,11 @@ class TargetStream {
     Pose pose = Pose::Identity();  ///< tip in base
     Twist twist = Twist::Zero();
   };
-  // Covariance of place and velocity, each times I₃.
+  // Covariance of place and velocity; each entry stands for a multiple of I₃.
   struct Covariance {
     double place, cross, velocity;
   };
-  static constexpr int kHistory = 64;  // samples that Interpolate looks back on
+  static constexpr int kHistory = 64;  // number of samples that Interpolate keeps
 
   const Sample& sample(int i) const noexcept { return history_[static_cast<std::size_t>((first_ + i) % kHistory)]; }
   bool reachable(const Sample& from, const Sample& to) const noexcept;
@@ -145,18 +145,20 @@ class TargetStream {
   Motion coast(const Motion& from, double seconds) const noexcept;
   Motion motion(double time) const noexcept;
   StreamStatus status(double time) const noexcept;
+  void place(const Motion& now) noexcept;
+  void approach(const Motion& then, const Motion& now, double dt) noexcept;
 
   TargetStreamOptions options_;
   SampleCounts counts_;
-  std::array<Sample, kHistory> history_;  // a ring; Hold and Predict need the newest only
+  std::array<Sample, kHistory> history_;  // a ring; Hold and Predict need only the newest sample
   int first_ = 0, count_ = 0;
-  Motion estimate_;  // Predict's, at the newest sample's time
+  Motion estimate_;  // of Predict, at the time of the newest sample
   Covariance linear_{}, angular_{};
   Sample candidate_;  // the last refused sample
   int candidates_ = 0;
   Target last_;
   double time_ = 0.0;
-  bool placed_ = false, timed_ = false;  // whether last_.pose, and time_, mean something
+  bool placed_ = false, timed_ = false;  // whether last_.pose is set, and whether time_ is set
 };
 
 }  // namespace sigmaik
