@@ -32,7 +32,7 @@ ComputedTorqueStep ComputedTorque::update(const JointRef& q, const JointRef& qdo
     v += qddot_desired + damping * qdot_desired + stiffness * (q_desired - q);
     step.status = Status::Ok;
   }
-  // τ = (C q̇ + g) + s M v with the largest s in [0, 1] that the limits allow: the error's direction is kept.
+  // τ = (C q̇ + g) + s M v, with the largest s in [0, 1] that the effort limits allow: scaling keeps the direction of v.
   JointVector bias;
   dynamics_.inverse_dynamics(q, qdot, JointVector::Zero(n), bias);
   dynamics_.inverse_dynamics(q, qdot, v, step.torque);
@@ -48,7 +48,7 @@ ComputedTorqueStep ComputedTorque::update(const JointRef& q, const JointRef& qdo
     if (step.status == Status::Ok) step.status = Status::Limited;
     step.torque = (bias + step.scale * asked).cwiseMax(-effort_).cwiseMin(effort_);
   }
-  if (!detail::finite(step.torque)) {  // overflow where there is no effort limit
+  if (!detail::finite(step.torque)) {  // overflow, possible only without effort limits
     step.torque.setZero();
     step.scale = 0.0;
     step.status = Status::BadInput;

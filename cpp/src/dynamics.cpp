@@ -24,13 +24,14 @@ KDL::JntArray joints(const Eigen::VectorXd& values, int n, const char* what) {
   return array;
 }
 
-// A body's principal moments are ∫ (y² + z²) dm and its like, so none is more than the sum of the others.
+// The principal moments of a body are ∫ (y² + z²) dm, ∫ (z² + x²) dm and ∫ (x² + y²) dm, so that no moment is larger
+// than the sum of the other two.
 void check_payload(const Inertia& payload) {
   const Eigen::Matrix3d& t = payload.tensor;
   detail::require(std::isfinite(payload.mass) && payload.mass >= 0.0, "payload: mass = ", payload.mass,
                   " must be finite and not negative");
   detail::require(payload.center_of_mass.allFinite() && t.allFinite(), "payload: an entry is not finite");
-  const double slack = 1e-9 * t.cwiseAbs().maxCoeff();  // what rounding in a data sheet's conversion leaves
+  const double slack = 1e-9 * t.cwiseAbs().maxCoeff();  // rounding of a data sheet's numbers
   detail::require((t - t.transpose()).cwiseAbs().maxCoeff() <= slack, "payload: the tensor is not symmetric");
   const Eigen::Vector3d moments = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(t, Eigen::EigenvaluesOnly)
                                       .eigenvalues();
@@ -43,11 +44,11 @@ void check_payload(const Inertia& payload) {
 }  // namespace
 
 struct Dynamics::Model {
-  KDL::Chain chain;  // before the solvers, which keep a reference
+  KDL::Chain chain;  // declared before the solvers, which keep a reference to the chain
   KDL::ChainDynParam solver;
   KDL::ChainIdSolver_RNE recursion;
   int dof;
-  KDL::JntArray q, qdot, qddot, torque;  // scratch of the real-time calls
+  KDL::JntArray q, qdot, qddot, torque;  // memory of the real-time calls
   KDL::JntSpaceInertiaMatrix mass;
   const KDL::Wrenches no_wrenches;
   DynamicsTerms terms;
@@ -65,7 +66,7 @@ struct Dynamics::Model {
         no_wrenches(chain.getNrOfSegments(), KDL::Wrench::Zero()) {}
   unsigned size() const { return static_cast<unsigned>(dof); }
 
-  // The payload is one more link, fixed to the tip.
+  // The payload becomes an additional link that is fixed to the tip.
   static KDL::Chain loaded(const Chain& arm, const std::optional<Inertia>& payload) {
     KDL::Chain chain = to_kdl(arm);
     if (payload) {
@@ -74,7 +75,7 @@ struct Dynamics::Model {
     return chain;
   }
 
-  // q, q̇ and q̈ are in the scratch.
+  // Torques for the members q, qdot and qddot.
   const Eigen::VectorXd& recurse() {
     recursion.CartToJnt(q, qdot, qddot, no_wrenches, torque);
     return torque.data;
@@ -84,7 +85,7 @@ struct Dynamics::Model {
 Dynamics::Dynamics(const Chain& chain, const Eigen::Vector3d& gravity, const std::optional<Inertia>& payload) {
   detail::require(gravity.allFinite(), "gravity has an entry that is not finite");
   if (payload) check_payload(*payload);
-  std::string waiting;  // a movable joint whose links so far have no inertia
+  std::string waiting;  // the last movable joint, if no link after the joint has an inertia yet
   const auto check = [&] {
     detail::require(waiting.empty(), "joint '", waiting, "' carries no link whose inertia is known: no dynamics");
   };

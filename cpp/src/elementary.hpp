@@ -1,6 +1,6 @@
 #pragma once
-// sin, cos and exp of several numbers at once, to about an ulp: reductions after Cody and Waite; sin and cos by Cephes'
-// polynomials.
+// sin, cos and exp of several numbers at once, to about one ulp. The arguments are reduced by the method of Cody and
+// Waite; sin and cos use the polynomials of Cephes.
 
 #include <cmath>
 
@@ -21,7 +21,7 @@ struct IntegersOf<4> {
 template <int lanes>
 using Integers = typename IntegersOf<lanes>::type;
 
-// Adding it rounds to an integer, which then stands in the lowest bits.
+// Adding this number rounds to an integer, and the integer is then found in the lowest bits of the sum.
 inline constexpr double kRounder = 6755399441055744.0;  // 1.5 · 2⁵²
 
 // For |x| ≤ 1e5.
@@ -32,11 +32,12 @@ SIGMAIK_INLINE void sincos_reduced(Vector<lanes> x, Vector<lanes>& sine, Vector<
   const V shifted = x * 0.63661977236758134308 + kRounder;  // quarter turns
   const I quarter = __builtin_bit_cast(I, shifted);
   const V n = shifted - kRounder;
-  V r = x - n * 1.57079625129699707031;  // π/2 in three parts, the first two short enough for exact products
+  V r = x - n * 1.57079625129699707031;  // π/2 in three parts; the first two have few digits, so that their products
+                                         // with n are exact
   r = r - n * 7.54978941586159635335e-8;
   r = r - n * 5.39030285815811905290e-15;
   const V z = r * r;
-  // Estrin's scheme: short chains of dependent operations.
+  // Estrin's scheme evaluates a polynomial in short chains of dependent operations.
   const V w = z * z;
   const V s = r + r * z *
                       ((8.33333333332211858878e-3 * z - 1.66666666666666307295e-1) +
@@ -51,7 +52,8 @@ SIGMAIK_INLINE void sincos_reduced(Vector<lanes> x, Vector<lanes>& sine, Vector<
   cosine = ((quarter + 1) & 2) != 0 ? -b : b;
 }
 
-// Numbers into vectors one by one: where they were stored one by one just before, a whole load would wait for them.
+// Loads numbers into vectors one by one. If the numbers were stored one by one just before, a load of a whole vector
+// would stall until all stores have finished.
 template <int lanes, int padded>
 SIGMAIK_INLINE Column<lanes, padded> gather(const double* x, int count) {
   Column<lanes, padded> out;
@@ -65,7 +67,7 @@ SIGMAIK_INLINE Column<lanes, padded> gather(const double* x, int count) {
   return out;
 }
 
-// Of `count` angles; what is beyond is padding.
+// Sines and cosines of `count` angles; entries beyond `count` are padding.
 template <int lanes, int padded>
 SIGMAIK_INLINE void sincos_all(const double* x, int count, double (&sine)[padded], double (&cosine)[padded]) {
   double largest = 0.0;
@@ -85,7 +87,7 @@ SIGMAIK_INLINE void sincos_all(const double* x, int count, double (&sine)[padded
   c.store(cosine);
 }
 
-// For x ≤ 700; zero where e^x is no normal number.
+// e^x for x ≤ 700; zero if e^x is smaller than the smallest normal number.
 template <int lanes>
 SIGMAIK_INLINE Vector<lanes> exp_reduced(Vector<lanes> x) {
   using V = Vector<lanes>;
@@ -94,9 +96,9 @@ SIGMAIK_INLINE Vector<lanes> exp_reduced(Vector<lanes> x) {
   const V y = tiny ? V{} : x;
   const V shifted = y * 1.4426950408889634074 + kRounder;
   const V n = shifted - kRounder;
-  V r = y - n * 6.93145751953125e-1;  // log 2 in two parts
+  V r = y - n * 6.93145751953125e-1;  // log 2 in two parts, as π/2 above
   r = r - n * 1.42860682030941723212e-6;
-  // Taylor's series up to r¹³/13!, less than 5e-18 off for |r| ≤ log(2)/2; Estrin's scheme.
+  // Taylor series up to r¹³/13! by Estrin's scheme; the error is below 5e-18 for |r| ≤ log(2)/2.
   const V r2 = r * r, r4 = r2 * r2, r8 = r4 * r4;
   const V low = (1.0 + r) + r2 * (0.5 + r * (1.0 / 6.0)) +
                 r4 * ((1.0 / 24.0 + r * (1.0 / 120.0)) + r2 * (1.0 / 720.0 + r * (1.0 / 5040.0)));

@@ -16,13 +16,14 @@ namespace sigmaik {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-// A singular value this small beside the largest is what rounding leaves of a zero: up to 4e-15 is seen.
+// A singular value below this part of the largest one counts as zero. Rounding turns an exact zero into up to 4e-15.
 constexpr double kRounding = 1e-14;
 
-// The index from σ_1 ≥ … ≥ σ_m, and its derivatives by them; these are zero where it is infinite.
+// The index as a function of σ_1 ≥ … ≥ σ_m, and its derivatives with respect to them. The derivatives of an infinite
+// index are zero.
 double from_sigma(Index index, double inverse_k, const Spectrum& spectrum, double* slope) noexcept {
   const int m = spectrum.rows();
-  const double least = spectrum.sigma(m - 1);  // zero beyond size()
+  const double least = spectrum.sigma(m - 1);  // Spectrum::sigma is zero beyond size()
   for (int i = 0; i < m; ++i) slope[i] = 0.0;
   switch (index) {
     case Index::Manipulability: {
@@ -108,7 +109,7 @@ double IndexFunction::value(const Chain& chain, const JointRef& q, JointVector& 
 }
 
 // With J_j = [v_j; ω_j], ∂_kJ x = [ω_k × Σ_{j≥k} v_j x_j + (Σ_{j<k} ω_j x_j) × v_k; ω_k × Σ_{j≥k} ω_j x_j]: running
-// sums give u_iᵀ ∂_kJ v_i for all k in one pass.
+// sums therefore give u_iᵀ ∂_kJ v_i for all k in one pass.
 double IndexFunction::gradient(const Jacobian& jacobian, JointVector& out) const noexcept {
   const int n = static_cast<int>(jacobian.cols());
   Jacobian weighted = jacobian;
@@ -156,7 +157,7 @@ double reference_scale(const Chain& chain, double length_scale) {
   const JointVector &low = configurations.lower, &high = configurations.upper;
   detail::require(std::isfinite(length_scale) && length_scale > 0.0, "length_scale = ", length_scale,
                   " must be finite and greater than 0");
-  // σ_1² and its gradient.
+  // σ_1², and its gradient in q.
   const auto largest = [&](const JointVector& q, JointVector* gradient) {
     ChainState state;
     update(chain, q, state);

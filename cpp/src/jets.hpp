@@ -1,6 +1,7 @@
 #pragma once
-// Scalars to put through a template: truncated Taylor series that know when compiling which joints they depend on, and
-// a recorder. Templates use x·y, x + y, x − y, number·x and x + number alone.
+// Scalar types for the formulas in singular_arms.hpp, which are templates over the scalar: truncated Taylor series
+// (jets) whose joints are known at compile time, and a recorder of operations. The formulas use only x·y, x + y, x − y,
+// number·x and x + number.
 
 #include <bit>
 #include <utility>
@@ -11,7 +12,7 @@
 
 namespace sigmaik::detail {
 
-// A joint's index as a type.
+// The index of a joint as a type.
 template <int i>
 using Joint = std::integral_constant<int, i>;
 
@@ -24,7 +25,8 @@ SIGMAIK_INLINE void for_joints(Function&& f) {
   }
 }
 
-// Value, gradient and, of order 2, Hessian, in the joints of `mask`. Entries of others are zero, and not stored.
+// Value, gradient and (if order = 2) Hessian with respect to the joints of `mask`. The derivatives with respect to all
+// other joints are zero and are not stored.
 template <unsigned mask, int order>
 struct Jet {
   static constexpr unsigned kMask = mask;
@@ -41,7 +43,7 @@ struct Jet {
   }
 };
 
-// z.g = f(i), z.h = s(i, j) for all of z's joints i ≥ j.
+// Sets z.g = f(i) and z.h = s(i, j) for all joints i ≥ j of z.
 template <unsigned mask, int order, typename First, typename Second>
 SIGMAIK_INLINE void fill(Jet<mask, order>& z, First&& f, Second&& s) {
   using Z = Jet<mask, order>;
@@ -126,7 +128,7 @@ SIGMAIK_INLINE Jet<a | b, order> operator*(const Jet<a, order>& x, const Jet<b, 
   return z;
 }
 
-// Writes down what is done to it.
+// A scalar that records the operations on it.
 struct Recorded {
   Tape* tape;
   int index;
@@ -148,7 +150,7 @@ struct Recorded {
   friend Recorded operator+(const Recorded& x, double c) { return x + record(x.tape, {Operation::Constant, 0, 0, c}); }
 };
 
-// The joints' sines and cosines, in each kind of scalar: x.s(Joint<i>), x.c(Joint<i>).
+// The sines and cosines of the joints, x.s(Joint<i>) and x.c(Joint<i>), for each scalar type.
 struct Values {
   const double *sine, *cosine;
   template <int i>
@@ -186,7 +188,7 @@ struct Recording {
   }
 
  private:
-  Recorded of(Operation::Kind kind, int joint) const {  // once each
+  Recorded of(Operation::Kind kind, int joint) const {  // records each sine and cosine once
     for (std::size_t at = 0; at < tape->operations.size(); ++at) {
       const Operation& o = tape->operations[at];
       if (o.kind == kind && o.a == joint) return {tape, static_cast<int>(at)};

@@ -32,25 +32,27 @@ KDL::Frame to_kdl_frame(const Pose& pose) {
   return frame;
 }
 
-// KDL's tensor is about the frame's origin, ours about the centre of mass: Steiner's m (c·c I − c cᵀ) apart.
+// KDL's tensor is about the origin of the frame, the tensor of an Inertia about the centre of mass. The difference is
+// m (c·c I − c cᵀ) (Steiner's theorem).
 std::optional<Inertia> to_inertia(const KDL::RigidBodyInertia& from) {
   Inertia inertia;
   inertia.mass = from.getMass();
   inertia.center_of_mass = to_eigen(from.getCOG());
   const KDL::RotationalInertia tensor = from.getRotationalInertia();
-  inertia.tensor = Eigen::Map<const Eigen::Matrix3d>(tensor.data);  // symmetric, so the order does not matter
+  inertia.tensor = Eigen::Map<const Eigen::Matrix3d>(
+      tensor.data);  // symmetric: row-major and column-major are the same
   const Eigen::Vector3d& c = inertia.center_of_mass;
   inertia.tensor -= inertia.mass * (c.squaredNorm() * Eigen::Matrix3d::Identity() - c * c.transpose());
   if (inertia.mass == 0.0 && inertia.tensor.isZero(0.0)) return std::nullopt;
   return inertia;
 }
 
-// Names for what KDL leaves without one, different from all others.
+// Makes a unique name for every link and joint that has no name in KDL.
 class Names {
  public:
   explicit Names(std::string base) : used_{std::move(base)} {}
   void take(const std::string& name) { used_.insert(name); }
-  static bool given(const std::string& name) { return !name.empty() && name != "NoName"; }  // KDL's default
+  static bool given(const std::string& name) { return !name.empty() && name != "NoName"; }  // KDL's default name
   std::string make(std::string name) {
     while (!used_.insert(name).second) name += '_';
     return name;
@@ -74,7 +76,7 @@ JointType type_of(const KDL::Joint& joint) {
   }
 }
 
-// +1 or −1. KDL has no getter for the scale: it is how far the joint moves for q = 1.
+// +1 or −1: the scale of the joint. KDL has no getter for the scale, which is how far the joint moves for q = 1.
 double direction_of(const KDL::Joint& joint, const Eigen::Vector3d& axis, const std::string& name) {
   require(axis.allFinite(), "joint '", name, "': its axis has no direction");
   const KDL::Twist twist = joint.twist(1.0);
@@ -102,14 +104,15 @@ Chain from_kdl(const KDL::Chain& chain, const std::string& base) {
     s.joint_name = Names::given(joint.getName()) ? joint.getName() : joints.make("joint" + std::to_string(number));
     s.link_name = Names::given(from.getName()) ? from.getName() : links.make("link" + std::to_string(number));
     s.type = type_of(joint);
-    s.origin = to_eigen(from.getFrameToTip());  // the tip at q = 0, with the joint's offset
+    s.origin = to_eigen(from.getFrameToTip());  // the tip at q = 0, including the joint's offset
     s.inertia = to_inertia(from.getInertia());
     if (s.type != JointType::Fixed) {
       Eigen::Vector3d axis = to_eigen(joint.JointAxis());
       axis *= direction_of(joint, axis, s.joint_name);
       s.axis = s.origin.linear().transpose() * axis;
 
-      // A link's frame lies on its joint's axis here, but anywhere on the link in KDL.
+      // In a Chain the frame of a link lies on the axis of the link's joint; in KDL the frame can lie anywhere on the
+      // link. A fixed segment from the axis to the frame makes up the difference.
       const Eigen::Vector3d arm = s.origin.translation() - to_eigen(joint.JointOrigin());
       const Eigen::Vector3d lever = arm - axis.dot(arm) * axis;
       if (s.type == JointType::Revolute && lever.norm() > 1e-15 * (1.0 + arm.norm())) {

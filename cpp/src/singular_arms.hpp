@@ -1,10 +1,11 @@
 #pragma once
-// What is known of each arm: one description, from which values, derivatives, expressions and texts come.
+// The singular sets of each known arm. Values, derivatives, recorded expressions and texts all come from one
+// description.
 //
-// `residuals` and `minors` are templates over the scalar: x.s(q4), x.c(q4) are sin and cos of the chain's fourth joint.
-// The squares of the minors add up to m² = det(JJᵀ). The Comau's come from its spherical wrist. Both seven-joint arms
-// have axes 1 to 3 through the shoulder: about that point m² is a sum over 3×3 minors of the moments of axes 4 to 7
-// (Cauchy-Binet).
+// `residuals` and `minors` are templates over the scalar: x.s(q4) and x.c(q4) are sin and cos of the chain's fourth
+// joint. The squares of the minors add up to m² = det(JJᵀ). The Comau has a spherical wrist, which leaves one minor.
+// Axes 1 to 3 of both seven-joint arms meet in the shoulder. About this point, m² is a sum over 3×3 minors of the
+// moments of axes 4 to 7 (Cauchy-Binet formula).
 
 #include <array>
 #include <tuple>
@@ -34,7 +35,7 @@ struct ComauRacer {
   static constexpr double a1 = 0.15, a2 = 0.59, a3 = 0.13, d4 = 0.684;
   static constexpr double l = 0.6962442100297855;  // √(a3² + d4²)
 
-  // The paper's angles are θ2 = π/2 − q2 and θ3 = q3 + π/2, so that θ2 + θ3 = π + q3 − q2.
+  // The paper's angles are θ2 = π/2 − q2 and θ3 = q3 + π/2, hence θ2 + θ3 = π + q3 − q2.
   template <typename X>
   static SIGMAIK_INLINE auto elbow(const X& x) {
     return a3 * x.c(q3) + d4 * x.s(q3);  // a3 sin θ3 − d4 cos θ3
@@ -62,8 +63,9 @@ struct PandaLengths {
   static constexpr double twist5 = 1.0;
 };
 
-// Of axis 5: P its distance from the shoulder; (−C, A) the wrist as the shoulder sees it; K is zero where shoulder,
-// elbow and wrist are in line; F, with cos q5, where the moments of axes 4, 6 and 7 lie in a plane.
+// P is the distance of axis 5 from the shoulder. (−C, A) is the position of the wrist relative to the shoulder. K is
+// zero if shoulder, elbow and wrist lie on one line. F and cos q5 are zero if the moments of axes 4, 6 and 7 lie in a
+// plane.
 template <typename L, typename X>
 struct SevenJoints {
   using Elbow = decltype(1.0 * std::declval<X>().s(q4) + 1.0 * std::declval<X>().c(q4));

@@ -37,7 +37,7 @@ using detail::Jet;
 using detail::Jets;
 using detail::Values;
 
-// Sines and cosines of all joints, padded to whole vectors.
+// The sines and cosines of all joints, padded to whole vectors.
 struct SinCos {
   double sine[8], cosine[8];
 
@@ -57,7 +57,8 @@ SIGMAIK_INLINE void for_each(const Tuple& tuple, Function&& f) {
   }(std::make_index_sequence<std::tuple_size_v<Tuple>>{});
 }
 
-// The kernels of an arm. `gradient` is (n,), `hessian` (n, n) with columns n apart; both are written whole.
+// The formulas of one arm, their derivatives included. `gradient` is (n,) and `hessian` (n, n), column by column; all
+// entries are written.
 template <typename Arm, int lanes>
 struct Kernels {
   static constexpr int n = Arm::kDof;
@@ -65,7 +66,7 @@ struct Kernels {
   using Minors = decltype(Arm::minors(Values{}));
   static constexpr int kResiduals = std::tuple_size_v<Residuals>, kMinors = std::tuple_size_v<Minors>;
 
-  // Which set a residual belongs to.
+  // The set of each residual.
   static constexpr std::array<int, kResiduals> kSet = [] {
     std::array<int, kResiduals> out{};
     for (int set = 0, at = 0; set < Arm::kSets; ++set) {
@@ -88,7 +89,7 @@ struct Kernels {
     return potentials(psi, p, phi);
   }
 
-  // φ_i, and their sum, weighted.
+  // The weighted potentials φ_i; returns their sum.
   static SIGMAIK_INLINE double potentials(const double (&psi)[kMaxSets], const Potential& p, double (&phi)[kMaxSets]) {
     double exponents[kMaxSets];
     for (int i = 0; i < kMaxSets; ++i) exponents[i] = p.eta1 - p.eta2 * psi[i];
@@ -101,7 +102,7 @@ struct Kernels {
     return sum;
   }
 
-  // Adds f x ∇x, and f (∇x∇xᵀ + x ∇²x): half of the derivatives of f x².
+  // Adds f x ∇x to the gradient and f (∇x∇xᵀ + x ∇²x) to the Hessian: half of the derivatives of f x².
   template <unsigned mask, int order>
   static SIGMAIK_INLINE void add_square(const Jet<mask, order>& x, double f, double* gradient, double* hessian) {
     using X = Jet<mask, order>;
@@ -182,7 +183,8 @@ struct Kernels {
     return std::sqrt(square);
   }
 
-  // ∇m = ∇(m²)/2m,  ∇²m = (∇²(m²)/2 − ∇m∇mᵀ)/m; of a single minor, without the cancellation.
+  // ∇m = ∇(m²)/2m,  ∇²m = (∇²(m²)/2 − ∇m∇mᵀ)/m; a single minor avoids the
+  // cancellation in these formulas.
   template <int order>
   static SIGMAIK_INLINE double manipulability(const double* q, double* gradient, double* hessian) {
     const SinCos x = SinCos::of<lanes>(q, n);
@@ -220,7 +222,7 @@ struct Kernels {
   }
 };
 
-// The kernels' entries, for one width of vectors.
+// Pointers to the kernels for one vector width.
 template <typename Arm>
 struct Entries {
   void (*residuals)(const double* q, double* r);
@@ -233,7 +235,8 @@ struct Entries {
   double (*manipulability_hessian)(const double* q, double* gradient, double* hessian);
 };
 
-// One function a kernel and width: the attribute lets the compiler use the processor's vectors in what it inlines.
+// One function for each kernel and vector width. The attribute allows the compiler to use the processor's wider vectors
+// in the kernel that is inlined into the function.
 #define SIGMAIK_ENTRIES(NAME, LANES, ATTRIBUTES)                                                              \
   template <typename Arm>                                                                                     \
   struct NAME {                                                                                               \
@@ -333,8 +336,9 @@ const std::vector<const SingularSets::Model*>& models() {
   return all;
 }
 
-// Whether two chains' axes move alike, whatever stands before the first and behind the last: for every pair of axes,
-// the cosine of their angle and the product of their screws are the same, in three postures.
+// Whether the axes of two chains move in the same way, whatever the transforms before the first and after the last axis
+// are. The test compares, for every pair of axes, the cosine of their angle and the reciprocal product of their screws,
+// in three postures.
 bool same_axes(const Chain& a, const Chain& b) {
   if (a.joint_types() != b.joint_types() || a.dof() != b.dof()) return false;
   const int n = a.dof();
@@ -357,8 +361,9 @@ bool same_axes(const Chain& a, const Chain& b) {
   return true;
 }
 
-// A joint about z, or −z, in a frame that is turned by `twist` about x and moved by `length` along it, then moved by
-// `offset` along z and turned by `angle` about it.
+// A joint about z (sign = 1) or −z (sign = −1). The joint's frame results from the frame before by a rotation by
+// `twist` about x, a translation by `length` along x and by `offset` along the new z, and a rotation by `angle` about
+// this z.
 struct Link {
   double twist, length, offset, angle = 0.0, sign = 1.0;
 };
@@ -379,7 +384,7 @@ Chain chain_of(const std::vector<Link>& links) {
   return Chain("base", segments);
 }
 
-// The kinematics that a model stands for, by the tables of Beck et al. (2022) and in the angles of the shipped arms.
+// The kinematics of a model, from the tables of Beck et al. (2022), with the joint angles of the shipped arms.
 Chain reference(const std::string& name) {
   constexpr double right = M_PI / 2.0;
   if (name == detail::ComauRacer::kName) {

@@ -1,5 +1,5 @@
 #pragma once
-// From a chain's base to its tip, in one flat pass over its constants.
+// The forward kinematics of a chain, from the base to the last joint, in one pass over the chain's constants.
 
 #include <cmath>
 
@@ -12,7 +12,7 @@ namespace sigmaik::detail {
 struct FrameColumns {
   Eigen::Vector4d x{1.0, 0.0, 0.0, 0.0}, y{0.0, 1.0, 0.0, 0.0}, z{0.0, 0.0, 1.0, 0.0}, p{0.0, 0.0, 0.0, 0.0};
 
-  // This frame, then that of `rotation` and `translation` in it.
+  // Appends a transform that is given in this frame.
   void append(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& translation) noexcept {
     p += along(translation);
     const Eigen::Vector4d new_x = along(rotation.col(0)), new_y = along(rotation.col(1));
@@ -21,7 +21,7 @@ struct FrameColumns {
     y = new_y;
   }
 
-  // Where a point of this frame is.
+  // The position of a point that is given in this frame.
   Eigen::Vector4d at(const Eigen::Vector3d& point) const noexcept { return p + along(point); }
 
  private:
@@ -31,8 +31,8 @@ struct FrameColumns {
   }
 };
 
-// Walks from the base to the last joint, whose frame is returned. `joint(i, frame)` sees every joint's frame, whose z
-// is its axis.
+// Calls joint(i, frame) for every joint, from the base to the last joint; z of the frame lies along the joint's axis.
+// Returns the frame of the last joint.
 template <typename Visit>
 FrameColumns walk(const Chain& chain, const JointRef& q, Visit joint) noexcept {
   const JointConstants* constants = chain.constants().data();
