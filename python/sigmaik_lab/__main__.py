@@ -58,12 +58,12 @@ def _parser(called: str) -> argparse.ArgumentParser:
 
 
 def _fill(parser: argparse.ArgumentParser, name: str) -> None:
-    found = study.study(name)
+    found = study.find_study(name)
     if found is not None:
         found.options(parser)
         parser.set_defaults(call=lambda args: run_study(name, args))
         return
-    command = study.command(name)
+    command = study.find_command(name)
     if command is None:
         raise ValueError(f"the folder of '{name}' has neither study.py nor command.py")
     command.options(parser)

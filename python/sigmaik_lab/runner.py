@@ -10,14 +10,14 @@ from typing import Any
 from sigmaik._extras import need
 
 from . import output
-from .study import study as find
+from .study import find_study
 
 __all__ = ["parsed", "run_study"]
 
 
 def parsed(name: str, words: list[str]) -> argparse.Namespace:
     """What a study's options are where these words are given."""
-    study = find(name)
+    study = find_study(name)
     assert study is not None
     parser = argparse.ArgumentParser(prog=f"sigmaik {name}")
     study.options(parser)
@@ -26,7 +26,7 @@ def parsed(name: str, words: list[str]) -> argparse.Namespace:
 
 def run_study(name: str, args: argparse.Namespace) -> int:
     """Loads, runs and reports a study, one experiment after the other. Returns the exit code."""
-    study = find(name)
+    study = find_study(name)
     assert study is not None
     if not getattr(args, "no_plot", True):
         need("matplotlib")  # told before the run, and not after

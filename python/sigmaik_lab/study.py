@@ -11,7 +11,7 @@ from typing import Any, Protocol, TypeVar
 
 from .report import Report
 
-__all__ = ["Command", "Progress", "Study", "command", "describe", "names", "study"]
+__all__ = ["Command", "Progress", "Study", "describe", "find_command", "find_study", "names"]
 
 _PACKAGE = __package__ or "sigmaik_lab"
 
@@ -78,12 +78,12 @@ def describe(name: str) -> tuple[str, str]:
     return first.rstrip("."), rest.strip()
 
 
-def study(name: str) -> Study[Any, Any] | None:
+def find_study(name: str) -> Study[Any, Any] | None:
     """The study of that name; None where the folder has a command instead."""
     return _module(name, "study")  # type: ignore[no-any-return]
 
 
-def command(name: str) -> Command | None:
+def find_command(name: str) -> Command | None:
     """The command of that name; None where the folder has none."""
     return _module(name, "command")  # type: ignore[no-any-return]
 

@@ -17,7 +17,7 @@ import sigmaik as sk
 from sigmaik_lab import output, report, runner, study
 from sigmaik_lab.__main__ import main
 
-STUDIES = [name for name in study.names() if study.study(name) is not None]
+STUDIES = [name for name in study.names() if study.find_study(name) is not None]
 DRAWING = [name for name in STUDIES if name not in ("drill", "reaching")]
 FIXED = {"axis5": "kuka_kr6_r900", "cart": "ur10", "round-table": "kuka_lbr_iiwa_14_r820"}
 
@@ -67,7 +67,7 @@ def plain(*arguments, path=""):
 
 def options_of(name):
     parser = argparse.ArgumentParser()
-    study.study(name).options(parser)
+    study.find_study(name).options(parser)
     return parser
 
 
@@ -87,7 +87,7 @@ def test_all_commands_are_found():
 
 @pytest.mark.parametrize("name", STUDIES)
 def test_study_has_the_functions_of_the_protocol(name):
-    found = study.study(name)
+    found = study.find_study(name)
     for function, count in (("options", 1), ("load", 1), ("run", 2), ("report", 2)):
         assert len(inspect.signature(getattr(found, function)).parameters) == count, function
 
@@ -300,8 +300,8 @@ def test_every_study_says_how_far_it_is(name, tmp_path):
         def advance(self, done=1.0):
             parts[-1][1] += done
 
-    for experiment in study.study(name).load(args):
-        study.study(name).run(experiment, Progress())
+    for experiment in study.find_study(name).load(args):
+        study.find_study(name).run(experiment, Progress())
     assert said
     for total, done in parts:
         assert 0.5 * total <= done <= 1.5 * total

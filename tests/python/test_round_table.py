@@ -9,18 +9,18 @@ from sigmaik_lab.round_table import experiment as at
 
 @pytest.mark.parametrize("seed", range(4))
 def test_free_of_collisions_and_further_from_singularities_with_the_index(seed):
-    scene = at.load(seed)
-    with_index, without = (at.plan(scene, index, seed) for index in (True, False))
+    task = at.load(seed)
+    with_index, without = (at.plan(task, index, seed) for index in (True, False))
     assert with_index.status != "failed"
     assert without.status != "failed"
-    a, b = at.along(scene, with_index), at.along(scene, without)
+    a, b = at.along(task, with_index), at.along(task, without)
     assert a.distance.min() > -1e-3
     assert b.distance.min() > -1e-3
     assert a.m.mean() >= b.m.mean()
     assert a.lambda_1.mean() >= b.lambda_1.mean()
     assert a.kappa.mean() <= b.kappa.mean()
-    assert a.q[0] == pytest.approx(scene.start)
-    assert a.q[-1] == pytest.approx(scene.goal, abs=1e-12)
+    assert a.q[0] == pytest.approx(task.start)
+    assert a.q[-1] == pytest.approx(task.goal, abs=1e-12)
 
 
 def test_by_the_gradient():
@@ -28,14 +28,14 @@ def test_by_the_gradient():
     for restarts in (0, 4):
         failed[restarts] = []
         for seed in range(24):
-            scene = at.load(seed)
+            task = at.load(seed)
             plan = sk.planning.gradient(
-                scene.chain, scene.start, scene.goal, scene.obstacles, spheres=scene.spheres, restarts=restarts
+                task.chain, task.start, task.goal, task.obstacles, spheres=task.spheres, restarts=restarts
             )
             if plan.status == "failed":
                 failed[restarts].append(seed)
             else:
-                assert at.along(scene, plan).distance.min() > -1e-3
+                assert at.along(task, plan).distance.min() > -1e-3
     assert failed[0]
     assert failed[4] == []
 
