@@ -5,6 +5,9 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+from docutils import nodes
+from sphinx.util.docutils import SphinxDirective
+
 import sigmaik
 
 project = "sigmaik"
@@ -31,7 +34,8 @@ napoleon_google_docstring = False
 python_maximum_signature_line_length = 100
 python_use_unqualified_type_names = True
 
-breathe_projects = {"sigmaik": str(Path(__file__).parents[1] / "build/docs/doxygen/xml")}
+ROOT = Path(__file__).parents[1]
+breathe_projects = {"sigmaik": str(ROOT / "build/docs/doxygen/xml")}
 breathe_default_project = "sigmaik"
 breathe_show_include = False
 cpp_maximum_signature_line_length = 100
@@ -79,6 +83,20 @@ def _signature(app, what, name, obj, options, signature: str | None, returned: s
     return signature, returned
 
 
+class Headers(SphinxDirective):
+    """A section with the comments of each header that matches: `.. headers:: servo.hpp planning/*.hpp`."""
+
+    required_arguments = 1
+    final_argument_whitespace = True
+
+    def run(self) -> list[nodes.Node]:
+        folder = ROOT / "cpp/include/sigmaik"
+        found = [file for pattern in self.arguments[0].split() for file in sorted(folder.glob(pattern))]
+        text = "".join(f"{f.name}\n{'-' * len(f.name)}\n\n.. doxygenfile:: {f.name}\n\n" for f in found)
+        return self.parse_text_to_nodes(text, allow_section_headings=True)
+
+
 def setup(app) -> None:
+    app.add_directive("headers", Headers)
     app.connect("autodoc-process-docstring", _text, priority=400)  # before napoleon
     app.connect("autodoc-process-signature", _signature)

@@ -33,15 +33,9 @@ def test_every_public_name_of_python_has_an_entry(module, entries):
     assert names - modules - {"sigmaik.__version__"} - entries["py"] == set()
 
 
-def test_every_header_is_on_one_page():
-    pages = "\n".join(page.read_text(encoding="utf-8") for page in (ROOT / "docs/api/cpp").glob("*.rst"))
-    listed = re.findall(r"^\.\. doxygenfile:: (\S+)$", pages, re.MULTILINE)
-    assert sorted(listed) == sorted(header.name for header in HEADERS.rglob("*.hpp") if header.name != "sigmaik.hpp")
-
-
 def test_every_public_class_of_a_header_has_an_entry(entries):
     text = "\n".join(header.read_text(encoding="utf-8") for header in HEADERS.rglob("*.hpp"))
-    names = set(re.findall(r"^(?:class|struct|enum class) (\w+)[^;]*{$", text, re.MULTILINE))
+    names = set(re.findall(r"^(?:class|struct|enum class) (\w+)[^;<]*{$", text, re.MULTILINE))
     assert len(names) > 50
     known = {name.rpartition("::")[2] for name in entries["cpp"]}
     assert names - known == set()
