@@ -5,15 +5,19 @@ set -uo pipefail
 cd "$(dirname "$0")/.."
 export PATH="$PWD/.venv/bin:$PATH"
 failed=()
-check() { "$@" || failed+=("$1 $2"); }
+check() {  # NAME COMMAND…
+  local name=$1
+  shift
+  "$@" || failed+=("$name")
+}
 
 mapfile -t sources < <(git ls-files '*.cpp' '*.hpp')
-check clang-format --dry-run --Werror "${sources[@]}"
-check ruff check --quiet
-check ruff format --check --quiet
-check mypy --no-error-summary
-check codespell $(git ls-files)
-check python tools/check_map.py
-check python tools/check_ci.py
+check clang-format clang-format --dry-run --Werror --ferror-limit=3 "${sources[@]}"
+check "ruff check" ruff check --quiet
+check "ruff format" ruff format --check --quiet
+check mypy mypy --no-error-summary
+check codespell codespell $(git ls-files)
+check "the map of sigmaik.hpp" python tools/check_map.py
+check "workflows and hooks" python tools/check_ci.py
 
 ((${#failed[@]} == 0)) || { printf 'lint: %s\n' "${failed[@]/#/failed: }" >&2; exit 1; }

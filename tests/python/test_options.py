@@ -15,7 +15,7 @@ ARM = "ur10"
 TAKES_OPTIONS = {
     "Servo": (lambda arm: (arm, sk.JParse()), "posture_gian", "posture_gain"),
     "ConstrainedIk": (lambda arm: (arm,), "torque_limit", "torque_limits"),
-    "ServoLoop": (lambda arm: (started(arm),), "histroy", "history"),
+    "ServoLoop": (lambda arm: (started(arm),), "histroy", "history"),  # codespell:ignore
     "TargetStream": (lambda arm: (), "smothing", "smoothing"),
     "ComputedTorque": (lambda arm: (arm,), "damping", "damping_ratio"),
 }

@@ -358,9 +358,18 @@ class Commander {
 
 // ---- An episode -----------------------------------------------------------------------------------------------------
 
-struct Outcome {
-  const JointVector *q, *qdot;
-  bool finite;
+// What an episode is about.
+struct Setup {
+  double dt;
+  bool constrained;  // ConstrainedIk, or Servo
+  std::string name;
+  Chain chain;
+  std::array<bool, 4> holds;  // limits of position, velocity, acceleration, jerk
+  double recovery_speed;
+  std::vector<Joint> joints;
+  JointVector start, moving;
+  bool at_once;              // the start is at rest: no command is faded in
+  bool position_only_start;  // reset() is told positions alone
 };
 
 class Episode {
@@ -372,222 +381,281 @@ class Episode {
     return static_cast<long>(random.decades(2.0, 3.7));
   }
 
+  // An episode is what its number says: the order in which numbers are drawn is part of this test.
   Counts run() {
+    Setup setup = draw();
+    if (talk_) describe(setup);
+    Commander commander(random_, setup.chain, setup.start, setup.constrained);
+    if (setup.constrained) {
+      drive_constrained(setup, commander);
+    } else {
+      drive_servo(setup, commander);
+    }
+    judge(setup);
+    return counts_;
+  }
+
+ private:
+  // ---- Draw
+
+  Setup draw() {
     length_ = static_cast<long>(random_.decades(2.0, 3.7));
     const double dt = random_.chance(0.5) ? 1e-3 : random_.decades(-4.0, -1.5);
     const bool constrained = random_.chance(0.3);
-    std::string name = "random";
-    std::optional<Chain> arm;
-    if (random_.chance(0.5)) {
-      const auto& all = shipped();
-      const auto which = static_cast<std::size_t>(random_.integer(0, static_cast<int>(all.size()) - 1));
-      const auto& [its_name, its_chain] = all[which];
-      name = its_name;
-      JointLimits limits = its_chain.limits();
-      const bool jerk = random_.chance(0.4), tight = random_.chance(0.4);
-      for (int i = 0; i < its_chain.dof(); ++i) {
-        if (tight) limits.velocity[i] = random_.decades(-2.0, 0.5);
-        if (tight || std::isinf(limits.acceleration[i])) limits.acceleration[i] = random_.decades(0.0, 3.0);
-        if (jerk) limits.jerk[i] = random_.decades(1.0, 6.0);
-      }
-      arm = random_.chance(0.2)   ? its_chain
-            : random_.chance(0.2) ? its_chain.with_limits(random_limits(random_, its_chain, dt))
-                                  : its_chain.with_limits(limits);
-    } else {
-      const Chain plain = random_.chain(random_.integer(2, 9), random_.chance(0.5) ? 0.0 : 0.4);
-      arm = plain.with_limits(random_limits(random_, plain, dt));
-    }
-    const Chain& chain = *arm;
-    const int n = chain.dof();
-    const bool holds[4] = {!random_.chance(0.05), !random_.chance(0.05), !random_.chance(0.05), !random_.chance(0.05)};
+    auto [name, chain] = random_.chance(0.5) ? draw_shipped(dt) : draw_random(dt);
+    const std::array<bool, 4> holds{!random_.chance(0.05), !random_.chance(0.05), !random_.chance(0.05),
+                                    !random_.chance(0.05)};
     const double recovery_speed = random_.chance(0.7) ? 0.1 : random_.decades(-1.0, 0.0);
+    Setup setup{dt, constrained, name, chain, holds, recovery_speed, {}, {}, {}, false, false};
+    draw_start(setup);
+    setup.at_once = setup.moving.isZero(0.0);
+    setup.position_only_start = setup.at_once && random_.chance(0.5);
+    return setup;
+  }
 
-    std::vector<Joint> joints;
-    JointVector start(n), moving = JointVector::Zero(n);
+  std::pair<std::string, Chain> draw_shipped(double dt) {
+    const auto& all = shipped();
+    const auto which = static_cast<std::size_t>(random_.integer(0, static_cast<int>(all.size()) - 1));
+    const auto& [name, chain] = all[which];
+    JointLimits limits = chain.limits();
+    const bool jerk = random_.chance(0.4), tight = random_.chance(0.4);
+    for (int i = 0; i < chain.dof(); ++i) {
+      if (tight) limits.velocity[i] = random_.decades(-2.0, 0.5);
+      if (tight || std::isinf(limits.acceleration[i])) limits.acceleration[i] = random_.decades(0.0, 3.0);
+      if (jerk) limits.jerk[i] = random_.decades(1.0, 6.0);
+    }
+    if (random_.chance(0.2)) return {name, chain};
+    return {name, chain.with_limits(random_.chance(0.2) ? random_limits(random_, chain, dt) : limits)};
+  }
+
+  std::pair<std::string, Chain> draw_random(double dt) {
+    const double prismatic = random_.chance(0.5) ? 0.0 : 0.4;
+    const Chain plain = random_.chain(random_.integer(2, 9), prismatic);
+    return {"random", plain.with_limits(random_limits(random_, plain, dt))};
+  }
+
+  // Where each joint starts, and how fast.
+  void draw_start(Setup& setup) {
+    const JointLimits& c = setup.chain.limits();
+    const auto& holds = setup.holds;
+    const int n = setup.chain.dof();
+    setup.start = setup.moving = JointVector::Zero(n);
     const int kind = random_.integer(0, 9);  // 0, 1: outside; 2: too fast; 3, 4: all zero; 5, 6: moving; else at rest
     for (int i = 0; i < n; ++i) {
-      const JointLimits& c = chain.limits();
-      const Limits limits{
-          holds[0] ? c.lower[i] : -kInfinity,   holds[0] ? c.upper[i] : kInfinity,
-          holds[1] ? c.velocity[i] : kInfinity, holds[2] ? c.acceleration[i] : kInfinity,
-          holds[3] ? c.jerk[i] : kInfinity,     std::isinf(c.velocity[i]) ? 0.01 : recovery_speed * c.velocity[i]};
-      double v = 0.0, q = inside(random_, limits.lower, limits.upper);
-      if (kind <= 1 && random_.chance(0.5)) {
-        const double over = random_.decades(-6.0, 0.3);
-        if (limits.upper < kInfinity && random_.chance(0.5))
-          q = limits.upper + over;
-        else if (limits.lower > -kInfinity)
-          q = limits.lower - over;
-      }
-      if (kind == 3 || kind == 4) q = 0.0;
-      const double speed = std::min(limits.velocity, random_.decades(-1.0, 1.0));
-      if (kind == 1 || kind == 2) v = 3.0 * speed * random_.uniform(-1.0, 1.0);
-      if (kind == 5 || kind == 6) v = speed * random_.uniform(-1.0, 1.0);
+      const Limits limits{holds[0] ? c.lower[i] : -kInfinity,
+                          holds[0] ? c.upper[i] : kInfinity,
+                          holds[1] ? c.velocity[i] : kInfinity,
+                          holds[2] ? c.acceleration[i] : kInfinity,
+                          holds[3] ? c.jerk[i] : kInfinity,
+                          std::isinf(c.velocity[i]) ? 0.01 : setup.recovery_speed * c.velocity[i]};
+      auto [q, v] = draw_joint(kind, limits);
       // What takes longer than the episode would tell nothing; zero is a pose that people do start at.
-      if (recovery_time(limits, dt, q, v) / dt > 0.9 * static_cast<double>(length_) &&
-          !can_be_kept(limits, dt, q, v, 0.0)) {
+      if (recovery_time(limits, setup.dt, q, v) / setup.dt > 0.9 * static_cast<double>(length_) &&
+          !can_be_kept(limits, setup.dt, q, v, 0.0)) {
         v = 0.0;
         q = std::clamp(q, limits.lower, limits.upper);
       }
-      start[i] = q;
-      moving[i] = v;
-      joints.emplace_back(limits, dt, q, v);
-      if (!joints.back().feasible()) ++counts_.infeasible_joints;
+      setup.start[i] = q;
+      setup.moving[i] = v;
+      setup.joints.emplace_back(limits, setup.dt, q, v);
+      if (!setup.joints.back().feasible()) ++counts_.infeasible_joints;
     }
     counts_.infeasible = counts_.infeasible_joints != 0;
-    const bool at_once = moving.isZero(0.0);  // no command is faded in
-    const bool position_only_start = at_once && random_.chance(0.5);
+  }
 
+  // Position and velocity.
+  std::pair<double, double> draw_joint(int kind, const Limits& limits) {
+    double v = 0.0, q = inside(random_, limits.lower, limits.upper);
+    if (kind <= 1 && random_.chance(0.5)) {
+      const double over = random_.decades(-6.0, 0.3);
+      if (limits.upper < kInfinity && random_.chance(0.5)) {
+        q = limits.upper + over;
+      } else if (limits.lower > -kInfinity) {
+        q = limits.lower - over;
+      }
+    }
+    if (kind == 3 || kind == 4) q = 0.0;
+    const double speed = std::min(limits.velocity, random_.decades(-1.0, 1.0));
+    if (kind == 1 || kind == 2) v = 3.0 * speed * random_.uniform(-1.0, 1.0);
+    if (kind == 5 || kind == 6) v = speed * random_.uniform(-1.0, 1.0);
+    return {q, v};
+  }
+
+  Task draw_task() {
+    Task task;
+    if (random_.chance(0.3)) {
+      for (bool& row : task.mask) row = random_.chance(0.6);
+      if (task.rows() == 0) task.mask[static_cast<std::size_t>(random_.integer(0, 5))] = true;
+    }
+    if (random_.chance(0.4)) task.frame = Frame::Tool;
+    return task;
+  }
+
+  void describe(const Setup& setup) const {
+    const JointLimits& c = setup.chain.limits();
+    std::printf("episode %u: %s, %d joints, %s, dt %.3g s, %ld cycles, %ld infeasible joints\n", number_,
+                setup.name.c_str(), setup.chain.dof(), setup.constrained ? "ConstrainedIk" : "Servo", setup.dt, length_,
+                counts_.infeasible_joints);
+    for (int i = 0; i < setup.chain.dof(); ++i) {
+      std::printf("  joint %d: q %.6g, qdot %.4g in [%.6g, %.6g], velocity %.4g, acceleration %.4g, jerk %.4g%s\n", i,
+                  setup.start[i], setup.moving[i], c.lower[i], c.upper[i], c.velocity[i], c.acceleration[i], c.jerk[i],
+                  setup.joints[static_cast<std::size_t>(i)].feasible() ? "" : " (infeasible)");
+    }
+  }
+
+  // ---- Build
+
+  template <typename Options>
+  static void build_limits(const Setup& setup, Options& o) {
+    o.limits.position = setup.holds[0];
+    o.limits.velocity = setup.holds[1];
+    o.limits.acceleration = setup.holds[2];
+    o.limits.jerk = setup.holds[3];
+    o.limits.recovery_speed = setup.recovery_speed;
+  }
+
+  ConstrainedIkOptions build_constrained(const Setup& setup) {
+    ConstrainedIkOptions o;
+    o.dt = setup.dt;
+    o.task = draw_task();
+    for (std::size_t i = 0; i < 6; ++i) o.exact[i] = random_.chance(0.4);
+    if (random_.chance(0.5)) o.beta.setConstant(random_.decades(-1.0, 2.0));
+    if (random_.chance(0.5)) o.gamma = random_.decades(-3.0, 3.0);
+    if (random_.chance(0.3)) o.max_error = Twist::Constant(random_.decades(-4.0, 0.0));
+    o.iterations = random_.integer(1, 3);
+    o.analytic = random_.chance(0.7);
+    o.torque_limits = random_.chance(0.3);
+    build_limits(setup, o);
+    return o;
+  }
+
+  ServoOptions build_servo(const Setup& setup) {
+    ServoOptions o;
+    o.dt = setup.dt;
+    o.task = draw_task();
+    if (random_.chance(0.4)) {
+      for (std::size_t i = 0; i < 6; ++i) o.exact[i] = o.task.mask[i] && random_.chance(0.4);
+    }
+    o.on_limit = random_.chance(0.6) ? OnLimit::Redistribute : OnLimit::Scale;
+    if (random_.chance(0.3)) o.gain_linear = o.gain_angular = random_.decades(-1.0, 2.5);
+    if (random_.chance(0.2)) o.max_linear_error = o.max_angular_error = kInfinity;
+    if (random_.chance(0.5)) o.soft_start = 0.0;
+    if (random_.chance(0.3)) {
+      o.posture_gain = random_.decades(-1.0, 1.5);
+      if (random_.chance(0.5)) {
+        o.posture = JointVector::NullaryExpr(setup.chain.dof(), [this] { return random_.uniform(-4.0, 4.0); });
+      }
+      if (random_.chance(0.5)) o.posture_max_speed = random_.decades(-2.0, 1.0);
+    }
+    if (random_.chance(0.3)) o.length_scale = random_.decades(-1.5, 1.0);
+    build_limits(setup, o);
+    return o;
+  }
+
+  // ---- Drive
+
+  void drive_constrained(Setup& setup, Commander& commander) {
+    counts_.constrained = 1;
+    ConstrainedIkOptions o = build_constrained(setup);
+    std::optional<ConstrainedIk> ik;
+    try {
+      ik.emplace(setup.chain, o);
+    } catch (const Error&) {  // no inertias, or no efforts
+      o.torque_limits = false;
+      ik.emplace(setup.chain, o);
+    }
+    counts_.analytic = ik->has_analytic();
+    ik->reset(setup.start, setup.position_only_start ? JointVector() : setup.moving);
     if (talk_) {
-      std::printf("episode %u: %s, %d joints, %s, dt %.3g s, %ld cycles, %ld infeasible joints\n", number_,
-                  name.c_str(), n, constrained ? "ConstrainedIk" : "Servo", dt, length_, counts_.infeasible_joints);
-      for (int i = 0; i < n; ++i) {
-        const JointLimits& c = chain.limits();
-        std::printf("  joint %d: q %.6g, qdot %.4g in [%.6g, %.6g], velocity %.4g, acceleration %.4g, jerk %.4g%s\n", i,
-                    start[i], moving[i], c.lower[i], c.upper[i], c.velocity[i], c.acceleration[i], c.jerk[i],
-                    joints[static_cast<std::size_t>(i)].feasible() ? "" : " (infeasible)");
-      }
+      std::printf("  gamma %g, max_error %g, iterations %d, analytic %d, torque limits %d\n", o.gamma.value_or(0.0),
+                  o.max_error[0], o.iterations, ik->has_analytic(), o.torque_limits);
     }
+    loop(setup, [&](long) {
+      const Command& command = commander.next(ik->tip());
+      const ConstrainedIkStep s = ik->step(command.pose);
+      ++counts_.constrained_status[static_cast<std::size_t>(s.status)];
+      input(command.bad, s.status == Status::BadInput, true);
+      held(s.active != 0, s.status == Status::Limited);
+      if (!(s.time_scale >= 0.0 && s.time_scale <= 1.0)) fail(kReport);
+      if (!s.error.allFinite() || !s.path_error.allFinite()) fail(kNotFinite);
+      if (s.status == Status::Ok && o.task.whole() && s.error.cwiseAbs().maxCoeff() > 2e-9) fail(kReport);
+      idle_ = command.bad;
+      q_ = s.q;
+      qdot_ = s.qdot;
+    });
+  }
 
-    const auto random_task = [&] {
-      Task task;
-      if (random_.chance(0.3)) {
-        for (bool& row : task.mask) row = random_.chance(0.6);
-        if (task.rows() == 0) task.mask[static_cast<std::size_t>(random_.integer(0, 5))] = true;
-      }
-      if (random_.chance(0.4)) task.frame = Frame::Tool;
-      return task;
-    };
-
-    Commander commander(random_, chain, start, constrained);
-    if (constrained) {
-      counts_.constrained = 1;
-      ConstrainedIkOptions o;
-      o.dt = dt;
-      o.task = random_task();
-      for (std::size_t i = 0; i < 6; ++i) o.exact[i] = random_.chance(0.4);
-      if (random_.chance(0.5)) o.beta.setConstant(random_.decades(-1.0, 2.0));
-      if (random_.chance(0.5)) o.gamma = random_.decades(-3.0, 3.0);
-      if (random_.chance(0.3)) o.max_error = Twist::Constant(random_.decades(-4.0, 0.0));
-      o.iterations = random_.integer(1, 3);
-      o.analytic = random_.chance(0.7);
-      o.torque_limits = random_.chance(0.3);
-      o.limits.position = holds[0];
-      o.limits.velocity = holds[1];
-      o.limits.acceleration = holds[2];
-      o.limits.jerk = holds[3];
-      o.limits.recovery_speed = recovery_speed;
-      std::optional<ConstrainedIk> ik;
-      try {
-        ik.emplace(chain, o);
-      } catch (const Error&) {  // no inertias, or no efforts
-        o.torque_limits = false;
-        ik.emplace(chain, o);
-      }
-      counts_.analytic = ik->has_analytic();
-      ik->reset(start, position_only_start ? JointVector() : moving);
-      if (talk_) {
-        std::printf("  gamma %g, max_error %g, iterations %d, analytic %d, torque limits %d\n", o.gamma.value_or(0.0),
-                    o.max_error[0], o.iterations, ik->has_analytic(), o.torque_limits);
-      }
-      loop(joints, start, moving, [&](long) {
-        const Command& command = commander.next(ik->tip());
-        const ConstrainedIkStep s = ik->step(command.pose);
-        ++counts_.constrained_status[static_cast<std::size_t>(s.status)];
-        input(command.bad, s.status == Status::BadInput, true);
-        held(s.active != 0, s.status == Status::Limited);
-        if (!(s.time_scale >= 0.0 && s.time_scale <= 1.0)) fail(kReport);
-        if (!s.error.allFinite() || !s.path_error.allFinite()) fail(kNotFinite);
-        if (s.status == Status::Ok && o.task.whole() && s.error.cwiseAbs().maxCoeff() > 2e-9) fail(kReport);
-        idle_ = command.bad;
-        q_ = s.q;
-        qdot_ = s.qdot;
-      });
-    } else {
-      counts_.servo = 1;
-      ServoOptions o;
-      o.dt = dt;
-      o.task = random_task();
-      if (random_.chance(0.4)) {
-        for (std::size_t i = 0; i < 6; ++i) o.exact[i] = o.task.mask[i] && random_.chance(0.4);
-      }
-      o.on_limit = random_.chance(0.6) ? OnLimit::Redistribute : OnLimit::Scale;
-      if (random_.chance(0.3)) o.gain_linear = o.gain_angular = random_.decades(-1.0, 2.5);
-      if (random_.chance(0.2)) o.max_linear_error = o.max_angular_error = kInfinity;
-      if (random_.chance(0.5)) o.soft_start = 0.0;
-      if (random_.chance(0.3)) {
-        o.posture_gain = random_.decades(-1.0, 1.5);
-        if (random_.chance(0.5)) {
-          o.posture = JointVector::NullaryExpr(n, [this] { return random_.uniform(-4.0, 4.0); });
-        }
-        if (random_.chance(0.5)) o.posture_max_speed = random_.decades(-2.0, 1.0);
-      }
-      if (random_.chance(0.3)) o.length_scale = random_.decades(-1.5, 1.0);
-      o.limits.position = holds[0];
-      o.limits.velocity = holds[1];
-      o.limits.acceleration = holds[2];
-      o.limits.jerk = holds[3];
-      o.limits.recovery_speed = recovery_speed;
-      const Method method = random_method(random_);
-      Servo servo(chain, method, o);
-      servo.reset(start, position_only_start ? JointVector() : moving);
-      const bool changes_method = random_.chance(0.1);
-      if (talk_) {
-        std::printf("  %s, %s, posture gain %g, gains %g, length scale %g, rows %d, exact %d%d%d%d%d%d\n",
-                    sigmaik::name(method), o.on_limit == OnLimit::Scale ? "Scale" : "Redistribute", o.posture_gain,
-                    o.gain_linear, o.length_scale, o.task.rows(), o.exact[0], o.exact[1], o.exact[2], o.exact[3],
-                    o.exact[4], o.exact[5]);
-      }
-      ChainState state;
-      loop(joints, start, moving, [&](long cycle) {
-        if (changes_method && random_.chance(0.01)) servo.set_method(random_method(random_));
-        const Command& command = commander.next(servo.tip());
-        const bool twist = command.kind == Command::kTwist;
-        // Without limits a huge twist takes a joint beyond what can be calculated with.
-        const bool sane = servo.q().cwiseAbs().maxCoeff() < 1e100;
-        const bool look = cycle % 32 == 0 && sane;
-        if (look) update(chain, servo.q(), state);
-        const ServoStep s = twist ? servo.update_twist(command.twist) : servo.update(command.pose);
-        ++counts_.servo_status[static_cast<std::size_t>(s.status)];
-        const bool judged = sane && (!twist || command.twist.cwiseAbs().maxCoeff() < 1e100);
-        input(command.bad, s.status == Status::BadInput, judged);
-        held(s.limiting_joints != 0, s.status == Status::Limited);
-        if (!(s.scale >= 0.0 && s.scale <= 1.0)) fail(kReport);
-        if (s.status == Status::Ok && s.scale != 1.0) fail(kReport);
-        if (!s.achieved_twist.allFinite() || !s.pose_error.allFinite()) fail(kNotFinite);
-        if (look && s.qdot.allFinite()) {
-          const double size = (1.0 + state.jacobian.norm()) * s.qdot.norm();
-          if (!((s.achieved_twist - state.jacobian * s.qdot).norm() <= 1e-12 * size)) fail(kReport);
-        }
-        if (look && twist && s.status == Status::Ok && o.posture_gain == 0.0 && (at_once || o.soft_start == 0.0)) {
-          // Ok: the twist is done.
-          Twist weighted = command.twist, missed = command.twist - s.achieved_twist;
-          weighted.tail<3>() *= o.length_scale;
-          missed.tail<3>() *= o.length_scale;
-          const TaskVector asked = select_rows(o.task, state.tip.linear(), weighted);
-          const TaskVector not_done = select_rows(o.task, state.tip.linear(), missed);
-          if (!(not_done.norm() <= 2.0 * kDone * asked.norm())) fail(kReport);
-        }
-        idle_ = command.bad ||
-                (twist && command.twist.isZero(0.0) && o.posture_gain == 0.0 && (at_once || o.soft_start == 0.0));
-        q_ = s.q;
-        qdot_ = s.qdot;
-      });
+  void drive_servo(Setup& setup, Commander& commander) {
+    counts_.servo = 1;
+    const ServoOptions o = build_servo(setup);
+    const Method method = random_method(random_);
+    Servo servo(setup.chain, method, o);
+    servo.reset(setup.start, setup.position_only_start ? JointVector() : setup.moving);
+    const bool changes_method = random_.chance(0.1);
+    if (talk_) {
+      std::printf("  %s, %s, posture gain %g, gains %g, length scale %g, rows %d, exact %d%d%d%d%d%d\n",
+                  sigmaik::name(method), o.on_limit == OnLimit::Scale ? "Scale" : "Redistribute", o.posture_gain,
+                  o.gain_linear, o.length_scale, o.task.rows(), o.exact[0], o.exact[1], o.exact[2], o.exact[3],
+                  o.exact[4], o.exact[5]);
     }
+    const bool no_fade = setup.at_once || o.soft_start == 0.0;
+    ChainState state;
+    loop(setup, [&](long cycle) {
+      if (changes_method && random_.chance(0.01)) servo.set_method(random_method(random_));
+      const Command& command = commander.next(servo.tip());
+      const bool twist = command.kind == Command::kTwist;
+      // Without limits a huge twist takes a joint beyond what can be calculated with.
+      const bool sane = servo.q().cwiseAbs().maxCoeff() < 1e100;
+      const bool look = cycle % 32 == 0 && sane;
+      if (look) update(setup.chain, servo.q(), state);
+      const ServoStep s = twist ? servo.update_twist(command.twist) : servo.update(command.pose);
+      ++counts_.servo_status[static_cast<std::size_t>(s.status)];
+      const bool judged = sane && (!twist || command.twist.cwiseAbs().maxCoeff() < 1e100);
+      input(command.bad, s.status == Status::BadInput, judged);
+      held(s.limiting_joints != 0, s.status == Status::Limited);
+      if (!(s.scale >= 0.0 && s.scale <= 1.0)) fail(kReport);
+      if (s.status == Status::Ok && s.scale != 1.0) fail(kReport);
+      if (!s.achieved_twist.allFinite() || !s.pose_error.allFinite()) fail(kNotFinite);
+      if (look && s.qdot.allFinite()) check_achieved(state, s);
+      if (look && twist && s.status == Status::Ok && o.posture_gain == 0.0 && no_fade) {
+        check_done(o, state, command.twist, s);
+      }
+      idle_ = command.bad || (twist && command.twist.isZero(0.0) && o.posture_gain == 0.0 && no_fade);
+      q_ = s.q;
+      qdot_ = s.qdot;
+    });
+  }
+
+  // ---- Judge
+
+  void check_achieved(const ChainState& state, const ServoStep& s) {
+    const double size = (1.0 + state.jacobian.norm()) * s.qdot.norm();
+    if (!((s.achieved_twist - state.jacobian * s.qdot).norm() <= 1e-12 * size)) fail(kReport);
+  }
+
+  // Status::Ok: the twist is done.
+  void check_done(const ServoOptions& o, const ChainState& state, const Twist& twist, const ServoStep& s) {
+    Twist weighted = twist, missed = twist - s.achieved_twist;
+    weighted.tail<3>() *= o.length_scale;
+    missed.tail<3>() *= o.length_scale;
+    const TaskVector asked = select_rows(o.task, state.tip.linear(), weighted);
+    const TaskVector not_done = select_rows(o.task, state.tip.linear(), missed);
+    if (!(not_done.norm() <= 2.0 * kDone * asked.norm())) fail(kReport);
+  }
+
+  void judge(const Setup& setup) {
     counts_.episodes = 1;
     counts_.cycles = length_;
-    counts_.joint_cycles = length_ * n;
+    counts_.joint_cycles = length_ * setup.chain.dof();
     for (std::uint32_t& episode : counts_.worst_episode) episode = number_;
-    for (const Joint& joint : joints) {
+    for (const Joint& joint : setup.joints) {
       if (joint.feasible()) continue;
       if (joint.recovered() >= 0.0) ++counts_.recovered_joints;
       counts_.longest_recovery = std::max(counts_.longest_recovery, joint.recovered() / joint.deadline());
     }
     if (counts_.any()) counts_.failed.push_back(number_);
-    return counts_;
   }
 
- private:
   void fail(Failure kind) {
     if (talk_ && said_[kind]++ < 5) std::printf("  cycle %ld, joint %d: %s\n", cycle_, joint_, kFailureNames[kind]);
     ++counts_.failures[kind];
@@ -603,12 +671,12 @@ class Episode {
   }
 
   template <typename Cycle>
-  void loop(std::vector<Joint>& joints, const JointVector& start, const JointVector& moving, const Cycle& cycle) {
-    const int n = static_cast<int>(joints.size());
-    int at_rest = moving.isZero(0.0) ? 2 : 0;  // cycles
+  void loop(Setup& setup, const Cycle& cycle) {
+    const int n = setup.chain.dof();
+    int at_rest = setup.at_once ? 2 : 0;  // cycles
     bool in = true;
-    for (const Joint& joint : joints) in = in && joint.feasible();
-    q_ = start;
+    for (const Joint& joint : setup.joints) in = in && joint.feasible();
+    q_ = setup.start;
     for (cycle_ = 0; cycle_ < length_; ++cycle_) {
       joint_ = -1;
       cycle(cycle_);
@@ -619,7 +687,7 @@ class Episode {
       if (idle_ && in && at_rest >= 2 && !qdot_.isZero(0.0)) fail(kUnasked);
       at_rest = qdot_.isZero(0.0) ? at_rest + 1 : 0;
       for (joint_ = 0; joint_ < n; ++joint_) {
-        joints[static_cast<std::size_t>(joint_)].step(
+        setup.joints[static_cast<std::size_t>(joint_)].step(
             cycle_, q_[joint_], qdot_[joint_], [this](Failure kind) { fail(kind); },
             [this](Failure kind, double value) {
               if (kind > kJerk) return;
