@@ -25,9 +25,17 @@ AnalyticSolutions solutions(const AnalyticIk& ik, const py::object& pose, bool w
   return found;
 }
 
-}  // namespace
+std::optional<py::array_t<double>> nearest(const AnalyticIk& ik, const py::object& pose, const ArrayLike& q,
+                                           bool within_limits) {
+  const JointVector near = joint_argument(q, "q", 6);
+  const AnalyticNearest found = ik.nearest(pose_argument(pose, "pose"), near);
+  if (found.status == AnalyticStatus::BadInput) throw Error("q is too large: beyond 1e9 rad");
+  if (found.status != AnalyticStatus::Ok) return std::nullopt;
+  if (within_limits && !found.branch.within_limits) return std::nullopt;
+  return to_numpy(found.branch.q);
+}
 
-void bind_analytic_ik(py::module_& m) {
+void bind_branch(py::module_& m) {
   py::class_<AnalyticBranch>(m, "AnalyticBranch", "One posture of a pose, from AnalyticIk.branches().")
       .def_property_readonly(
           "q", [](const AnalyticBranch& b) { return to_numpy(b.q); }, "(6,) [rad]")
@@ -40,7 +48,9 @@ void bind_analytic_ik(py::module_& m) {
                ", within_limits=" + (b.within_limits ? "True" : "False") +
                ", singular=" + py::str(singular_names(b.singular)).cast<std::string>() + ")";
       });
+}
 
+void bind_inverse(py::module_& m) {
   py::class_<AnalyticIk>(m, "AnalyticIk",
                          "Closed-form inverse kinematics of six revolute joints with a spherical wrist.\n\n"
                          "Covers arms whose axes 4, 5, 6 meet in one point and whose axes 2 and 3 are parallel, to\n"
@@ -70,22 +80,11 @@ void bind_analytic_ik(py::module_& m) {
           },
           py::arg("pose"), py::kw_only(), py::arg("within_limits") = false,
           "The postures of solve() in the same order, each with its limits and singularities.")
-      .def(
-          "nearest",
-          [](const AnalyticIk& ik, const py::object& pose, const ArrayLike& q,
-             bool within_limits) -> std::optional<py::array_t<double>> {
-            const JointVector near = joint_argument(q, "q", 6);
-            const AnalyticNearest found = ik.nearest(pose_argument(pose, "pose"), near);
-            if (found.status == AnalyticStatus::BadInput) throw Error("q is too large: beyond 1e9 rad");
-            if (found.status != AnalyticStatus::Ok) return std::nullopt;
-            if (within_limits && !found.branch.within_limits) return std::nullopt;
-            return to_numpy(found.branch.q);
-          },
-          py::arg("pose"), py::arg("q"), py::kw_only(), py::arg("within_limits") = false,
-          "The posture (6,) [rad] of `pose` (4, 4) nearest to q (6,) by Euclidean norm; None where out of reach.\n\n"
-          "One within the joint limits where there is one. within_limits: None where there is not.\n\n"
-          "Each joint is on the turn nearest to q within its limits. An angle that is free at a singularity stays as\n"
-          "in q, so that a path straight through is followed.")
+      .def("nearest", &nearest, py::arg("pose"), py::arg("q"), py::kw_only(), py::arg("within_limits") = false,
+           "The posture (6,) [rad] of `pose` (4, 4) nearest to q (6,) by Euclidean norm; None where out of reach.\n\n"
+           "One within the joint limits where there is one. within_limits: None where there is not.\n\n"
+           "Each joint is on the turn nearest to q within its limits. An angle that is free at a singularity stays as\n"
+           "in q, so that a path straight through is followed.")
       .def(
           "singular",
           [](const AnalyticIk& ik, const py::object& pose) {
@@ -100,6 +99,13 @@ void bind_analytic_ik(py::module_& m) {
       .def_property_readonly("chain", &AnalyticIk::chain, "The arm.")
       .def("__repr__",
            [](const AnalyticIk& ik) { return "AnalyticIk('" + ik.chain().base() + "' → '" + ik.chain().tip() + "')"; });
+}
+
+}  // namespace
+
+void bind_analytic_ik(py::module_& m) {
+  bind_branch(m);
+  bind_inverse(m);
 }
 
 }  // namespace sigmaik::bindings

@@ -25,9 +25,7 @@ JointVector limit_argument(const MaybeArray& object, const char* what, const Joi
   return Eigen::Map<const Eigen::VectorXd>(array.data(), array.size());
 }
 
-}  // namespace
-
-void bind_chain(py::module_& m) {
+void bind_limits(py::module_& m) {
   py::class_<JointLimits>(m, "JointLimits",
                           "Limits of a chain's movable joints, (n,) each, infinite where there is none.")
       .def_property_readonly(
@@ -41,7 +39,9 @@ void bind_chain(py::module_& m) {
       .def_property_readonly(
           "jerk", [](const JointLimits& l) { return to_numpy(l.jerk); }, "(n,) [rad/s³ or m/s³]")
       .def_property_readonly("effort", [](const JointLimits& l) { return to_numpy(l.effort); }, "(n,) [N·m or N]");
+}
 
+void bind_inertia(py::module_& m) {
   py::class_<Inertia>(m, "Inertia", "Mass distribution of a link, or of what the tip carries. Immutable.")
       .def(py::init([](double mass, const ArrayLike& center_of_mass, const MaybeArray& tensor) {
              Inertia inertia;
@@ -68,7 +68,9 @@ void bind_chain(py::module_& m) {
           "(3, 3) [kg·m²], about the centre of mass, in the link's axes")
       .def("__repr__",
            [](const Inertia& i) { return "Inertia(" + py::repr(py::float_(i.mass)).cast<std::string>() + " kg)"; });
+}
 
+void bind_segment(py::module_& m) {
   py::class_<Segment>(
       m, "Segment",
       "A joint, fixed or movable, and the link that it carries. The link's frame is the joint's after the "
@@ -87,36 +89,37 @@ void bind_chain(py::module_& m) {
       .def("__repr__", [](const Segment& s) {
         return "Segment('" + s.joint_name + "' carries '" + s.link_name + "', " + to_string(s.type) + ")";
       });
+}
 
-  py::class_<Chain>(m, "Chain",
-                    "A serial arm: joints, limits and inertias between a base and a tip. Immutable, safe to share.\n\n"
-                    "Twists and Jacobians are [v; ω], in the axes of the base, at the tip's origin\n"
-                    "(Pinocchio's LOCAL_WORLD_ALIGNED). Poses are 4×4, tip in base.")
-      .def_static(
-          "from_urdf",
-          [](const py::object& source, const std::optional<std::string>& base, const std::optional<std::string>& tip,
-             const MaybeArray& acceleration) {
-            const auto text = py::module_::import("os").attr("fspath")(source).cast<std::string>();
-            std::vector<double> limits;
-            if (acceleration) {
-              const Array array = Array::ensure(*acceleration);
-              if (!array || array.ndim() != 1) {
-                PyErr_Clear();
-                throw Error("acceleration must be a list of numbers, one a movable joint");
-              }
-              limits.assign(array.data(), array.data() + array.size());
-            }
-            return Chain::from_urdf(text, base.value_or(""), tip.value_or(""), limits);
-          },
-          py::arg("source"), py::arg("base") = py::none(), py::arg("tip") = py::none(),
-          py::arg("acceleration") = py::none(),
-          "Reads a URDF.\n\n"
-          "source: a file's path, or the XML text.\n"
-          "base, tip: link names; by default the root, and the only leaf.\n"
-          "acceleration: (n,) limits [rad/s² or m/s²]; by default those of the file, whose <limit> elements may carry\n"
-          "an attribute `acceleration` (an extension), else infinite.\n\n"
-          "Raises Error with the facts for anything that is not a usable serial arm of 1 to 16 movable joints.")
-      .def_property_readonly("dof", &Chain::dof, "Number of movable joints, n.")
+void bind_from_urdf(py::class_<Chain>& cls) {
+  cls.def_static(
+      "from_urdf",
+      [](const py::object& source, const std::optional<std::string>& base, const std::optional<std::string>& tip,
+         const MaybeArray& acceleration) {
+        const auto text = py::module_::import("os").attr("fspath")(source).cast<std::string>();
+        std::vector<double> limits;
+        if (acceleration) {
+          const Array array = Array::ensure(*acceleration);
+          if (!array || array.ndim() != 1) {
+            PyErr_Clear();
+            throw Error("acceleration must be a list of numbers, one a movable joint");
+          }
+          limits.assign(array.data(), array.data() + array.size());
+        }
+        return Chain::from_urdf(text, base.value_or(""), tip.value_or(""), limits);
+      },
+      py::arg("source"), py::arg("base") = py::none(), py::arg("tip") = py::none(),
+      py::arg("acceleration") = py::none(),
+      "Reads a URDF.\n\n"
+      "source: a file's path, or the XML text.\n"
+      "base, tip: link names; by default the root, and the only leaf.\n"
+      "acceleration: (n,) limits [rad/s² or m/s²]; by default those of the file, whose <limit> elements may carry\n"
+      "an attribute `acceleration` (an extension), else infinite.\n\n"
+      "Raises Error with the facts for anything that is not a usable serial arm of 1 to 16 movable joints.");
+}
+
+void bind_parts(py::class_<Chain>& cls) {
+  cls.def_property_readonly("dof", &Chain::dof, "Number of movable joints, n.")
       .def_property_readonly("base", &Chain::base, "Name of the base link.")
       .def_property_readonly("tip", &Chain::tip, "Name of the tip link.")
       .def_property_readonly(
@@ -148,16 +151,19 @@ void bind_chain(py::module_& m) {
           },
           py::kw_only(), py::arg("lower") = py::none(), py::arg("upper") = py::none(), py::arg("velocity") = py::none(),
           py::arg("acceleration") = py::none(), py::arg("jerk") = py::none(), py::arg("effort") = py::none(),
-          "The same arm with other limits: (n,) or one number each, infinite for none; None keeps what there is.")
-      .def(
-          "pose",
-          [](const Chain& c, const ArrayLike& q) {
-            return map_configurations(c.dof(), q, {4, 4}, [&c](const JointVector& joints, double* out) {
-              Eigen::Map<Eigen::Matrix<double, 4, 4, Eigen::RowMajor>> result(out);
-              result = pose(c, joints).matrix();
-            });
-          },
-          py::arg("q"), "Pose (4, 4) of the tip in the base at q (n,) [rad or m]; (B, 4, 4) at q (B, n).")
+          "The same arm with other limits: (n,) or one number each, infinite for none; None keeps what there is.");
+}
+
+void bind_kinematics(py::class_<Chain>& cls) {
+  cls.def(
+         "pose",
+         [](const Chain& c, const ArrayLike& q) {
+           return map_configurations(c.dof(), q, {4, 4}, [&c](const JointVector& joints, double* out) {
+             Eigen::Map<Eigen::Matrix<double, 4, 4, Eigen::RowMajor>> result(out);
+             result = pose(c, joints).matrix();
+           });
+         },
+         py::arg("q"), "Pose (4, 4) of the tip in the base at q (n,) [rad or m]; (B, 4, 4) at q (B, n).")
       .def(
           "jacobian",
           [](const Chain& c, const ArrayLike& q) {
@@ -194,10 +200,26 @@ void bind_chain(py::module_& m) {
           },
           py::arg("seed") = py::none(),
           "Positions (n,) drawn uniformly within the limits, within ±π where there are none.\n\n"
-          "seed: what numpy.random.default_rng takes, a Generator included.")
-      .def("__repr__", [](const Chain& c) {
-        return "Chain('" + c.base() + "' → '" + c.tip() + "', " + std::to_string(c.dof()) + " joints)";
-      });
+          "seed: what numpy.random.default_rng takes, a Generator included.");
+}
+
+}  // namespace
+
+void bind_chain(py::module_& m) {
+  bind_limits(m);
+  bind_inertia(m);
+  bind_segment(m);
+  py::class_<Chain> cls(
+      m, "Chain",
+      "A serial arm: joints, limits and inertias between a base and a tip. Immutable, safe to share.\n\n"
+      "Twists and Jacobians are [v; ω], in the axes of the base, at the tip's origin\n"
+      "(Pinocchio's LOCAL_WORLD_ALIGNED). Poses are 4×4, tip in base.");
+  bind_from_urdf(cls);
+  bind_parts(cls);
+  bind_kinematics(cls);
+  cls.def("__repr__", [](const Chain& c) {
+    return "Chain('" + c.base() + "' → '" + c.tip() + "', " + std::to_string(c.dof()) + " joints)";
+  });
 }
 
 }  // namespace sigmaik::bindings

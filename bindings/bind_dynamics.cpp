@@ -23,9 +23,7 @@ Eigen::Vector3d gravity_argument(const MaybeArray& gravity, const Eigen::Vector3
   return Eigen::Map<const Eigen::Vector3d>(array_argument(*gravity, "gravity", {3}, "(3,)").data());
 }
 
-}  // namespace
-
-void bind_dynamics(py::module_& m) {
+void bind_rigid_body(py::module_& m) {
   py::class_<Dynamics>(m, "Dynamics",
                        "Rigid-body dynamics M(q) q̈ + C(q, q̇) q̇ + g(q) = τ of a chain with what it carries, by KDL.")
       .def(py::init([](const Chain& chain, const MaybeArray& gravity, const std::optional<Inertia>& payload) {
@@ -77,7 +75,9 @@ void bind_dynamics(py::module_& m) {
           py::arg("q"), py::arg("qdot"), py::arg("torque"),
           "q̈ = M⁻¹ (τ − C q̇ − g) (n,) [rad/s² or m/s²] at q, q̇ (n,) under τ (n,) [N·m].\n\n"
           "Raises Error where M is not positive definite.");
+}
 
+void bind_computed_torque(py::module_& m) {
   py::class_<ComputedTorqueStep>(m, "ComputedTorqueStep", "Answer of one cycle of a ComputedTorque.")
       .def_property_readonly(
           "torque", [](const ComputedTorqueStep& s) { return to_numpy(s.torque); },
@@ -104,10 +104,10 @@ void bind_dynamics(py::module_& m) {
   c.def_property_readonly("dof", &ComputedTorque::dof, "Number of movable joints, n.")
       .def(
           "update",
-          [](ComputedTorque& c, const ArrayLike& q, const ArrayLike& qdot, const ArrayLike& q_desired,
+          [](ComputedTorque& control, const ArrayLike& q, const ArrayLike& qdot, const ArrayLike& q_desired,
              const ArrayLike& qdot_desired, const ArrayLike& qddot_desired) {
-            const int n = c.dof();
-            const ComputedTorqueStep step = c.update(
+            const int n = control.dof();
+            const ComputedTorqueStep step = control.update(
                 joint_argument(q, "q", n), joint_argument(qdot, "qdot", n), joint_argument(q_desired, "q_desired", n),
                 joint_argument(qdot_desired, "qdot_desired", n), joint_argument(qddot_desired, "qddot_desired", n));
             if (step.status == Status::BadInput) throw Error("the torque is too large for floating-point numbers");
@@ -115,6 +115,13 @@ void bind_dynamics(py::module_& m) {
           },
           py::arg("q"), py::arg("qdot"), py::arg("q_desired"), py::arg("qdot_desired"), py::arg("qddot_desired"),
           "One cycle: the arm is at q, q̇ (n,), and should be at q_d, q̇_d, accelerating by q̈_d.");
+}
+
+}  // namespace
+
+void bind_dynamics(py::module_& m) {
+  bind_rigid_body(m);
+  bind_computed_torque(m);
 }
 
 }  // namespace sigmaik::bindings

@@ -39,26 +39,18 @@ Recording recording(const Tape& tape) {
 
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-}  // namespace
+using Integers = py::typing::Tuple<py::int_, py::ellipsis>;
 
-void bind_singularities(py::module_& m) {
-  const Potential standard;
-  const auto integers = [](const std::vector<int>& values) {
-    py::tuple out(values.size());
-    for (std::size_t i = 0; i < values.size(); ++i) out[i] = values[i];
-    return out;
-  };
-  using Integers = py::typing::Tuple<py::int_, py::ellipsis>;
+Integers integers(const std::vector<int>& values) {
+  py::tuple out(values.size());
+  for (std::size_t i = 0; i < values.size(); ++i) out[i] = values[i];
+  return out;
+}
 
-  py::class_<SingularSets>(
-      m, "SingularSets",
-      "The known singular sets of an arm: potentials around them, and its manipulability in closed\n"
-      "form (Beck et al. 2022, corrected and completed). q is (n,) in the chain's angles [rad], or\n"
-      "(B, n): then every result has B rows.\n\n"
-      "Set i is where ψ_i = Σ r² vanishes; its residuals r have no unit, and near the set ψ is about\n"
-      "the squared distance in the joints' space. A set's codimension is the number of its residuals:\n"
-      "those of codimension 1 are walls, across which r changes its sign.")
-      .def_property_readonly("name", &SingularSets::name, "Of the arm.")
+const Potential kStandard;
+
+void bind_sets(py::class_<SingularSets>& cls) {
+  cls.def_property_readonly("name", &SingularSets::name, "Of the arm.")
       .def_property_readonly("dof", &SingularSets::dof, "Number of joints, n.")
       .def("__len__", &SingularSets::size)
       .def_property_readonly(
@@ -79,7 +71,7 @@ void bind_singularities(py::module_& m) {
           "What holds on each set, in words.")
       .def_property_readonly(
           "codimensions",
-          [integers](const SingularSets& s) -> Integers {
+          [](const SingularSets& s) -> Integers {
             std::vector<int> out;
             for (int i = 0; i < s.size(); ++i) out.push_back(s.set(i).codimension);
             return integers(out);
@@ -87,7 +79,7 @@ void bind_singularities(py::module_& m) {
           "Number of residuals of each set.")
       .def_property_readonly(
           "joints",
-          [integers](const SingularSets& s) -> py::typing::Tuple<Integers, py::ellipsis> {
+          [](const SingularSets& s) -> py::typing::Tuple<Integers, py::ellipsis> {
             py::list out;
             for (int i = 0; i < s.size(); ++i) out.append(integers(s.set(i).joints));
             return py::tuple(out);
@@ -110,17 +102,20 @@ void bind_singularities(py::module_& m) {
               std::copy_n(r.begin(), s.residuals(joints, r), out);
             });
           },
-          py::arg("q"), "The residuals themselves, set after set: codimensions[i] numbers for set i.")
-      .def(
-          "potential",
-          [](const SingularSets& s, const ArrayLike& q, double eta1, double eta2,
-             const MaybeArray& weights) -> NumberOrArray {
-            const Potential p = potential_argument(s, eta1, eta2, weights);
-            return number_or_array(map_configurations(
-                s.dof(), q, {}, [&](const JointVector& joints, double* out) { *out = s.potential(joints, p); }));
-          },
-          py::arg("q"), py::arg("eta1") = standard.eta1, py::arg("eta2") = standard.eta2,
-          py::arg("weights") = py::none(), "Σ_i w_i exp(η₁ − η₂ ψ_i(q)); w (c,), by default ones.")
+          py::arg("q"), "The residuals themselves, set after set: codimensions[i] numbers for set i.");
+}
+
+void bind_potential(py::class_<SingularSets>& cls) {
+  cls.def(
+         "potential",
+         [](const SingularSets& s, const ArrayLike& q, double eta1, double eta2,
+            const MaybeArray& weights) -> NumberOrArray {
+           const Potential p = potential_argument(s, eta1, eta2, weights);
+           return number_or_array(map_configurations(
+               s.dof(), q, {}, [&](const JointVector& joints, double* out) { *out = s.potential(joints, p); }));
+         },
+         py::arg("q"), py::arg("eta1") = kStandard.eta1, py::arg("eta2") = kStandard.eta2,
+         py::arg("weights") = py::none(), "Σ_i w_i exp(η₁ − η₂ ψ_i(q)); w (c,), by default ones.")
       .def(
           "gradient",
           [](const SingularSets& s, const ArrayLike& q, double eta1, double eta2, const MaybeArray& weights) {
@@ -131,7 +126,7 @@ void bind_singularities(py::module_& m) {
               std::copy_n(gradient.data(), gradient.size(), out);
             });
           },
-          py::arg("q"), py::arg("eta1") = standard.eta1, py::arg("eta2") = standard.eta2,
+          py::arg("q"), py::arg("eta1") = kStandard.eta1, py::arg("eta2") = kStandard.eta2,
           py::arg("weights") = py::none(), "Gradient (n,) of the potential [1/rad].")
       .def(
           "hessian",
@@ -145,15 +140,18 @@ void bind_singularities(py::module_& m) {
               Eigen::Map<RowMajor>(out, n, n) = hessian;
             });
           },
-          py::arg("q"), py::arg("eta1") = standard.eta1, py::arg("eta2") = standard.eta2,
-          py::arg("weights") = py::none(), "Hessian (n, n) of the potential [1/rad²].")
-      .def(
-          "manipulability",
-          [](const SingularSets& s, const ArrayLike& q) -> NumberOrArray {
-            return number_or_array(map_configurations(
-                s.dof(), q, {}, [&](const JointVector& joints, double* out) { *out = s.manipulability(joints); }));
-          },
-          py::arg("q"), "√det(JJᵀ) in closed form, accurate down to zero.")
+          py::arg("q"), py::arg("eta1") = kStandard.eta1, py::arg("eta2") = kStandard.eta2,
+          py::arg("weights") = py::none(), "Hessian (n, n) of the potential [1/rad²].");
+}
+
+void bind_manipulability(py::class_<SingularSets>& cls) {
+  cls.def(
+         "manipulability",
+         [](const SingularSets& s, const ArrayLike& q) -> NumberOrArray {
+           return number_or_array(map_configurations(
+               s.dof(), q, {}, [&](const JointVector& joints, double* out) { *out = s.manipulability(joints); }));
+         },
+         py::arg("q"), "√det(JJᵀ) in closed form, accurate down to zero.")
       .def(
           "manipulability_gradient",
           [](const SingularSets& s, const ArrayLike& q) {
@@ -175,10 +173,26 @@ void bind_singularities(py::module_& m) {
               Eigen::Map<RowMajor>(out, n, n) = hessian;
             });
           },
-          py::arg("q"), "Hessian (n, n) of the manipulability; zero on a singular set, where there is none.")
-      .def(
-          "_residual_tape", [](const SingularSets& s) { return recording(s.residual_tape()); },
-          "See sigmaik.singularities.symbolic_residuals.")
+          py::arg("q"), "Hessian (n, n) of the manipulability; zero on a singular set, where there is none.");
+}
+
+}  // namespace
+
+void bind_singularities(py::module_& m) {
+  py::class_<SingularSets> cls(
+      m, "SingularSets",
+      "The known singular sets of an arm: potentials around them, and its manipulability in closed\n"
+      "form (Beck et al. 2022, corrected and completed). q is (n,) in the chain's angles [rad], or\n"
+      "(B, n): then every result has B rows.\n\n"
+      "Set i is where ψ_i = Σ r² vanishes; its residuals r have no unit, and near the set ψ is about\n"
+      "the squared distance in the joints' space. A set's codimension is the number of its residuals:\n"
+      "those of codimension 1 are walls, across which r changes its sign.");
+  bind_sets(cls);
+  bind_potential(cls);
+  bind_manipulability(cls);
+  cls.def(
+         "_residual_tape", [](const SingularSets& s) { return recording(s.residual_tape()); },
+         "See sigmaik.singularities.symbolic_residuals.")
       .def(
           "_manipulability_tape", [](const SingularSets& s) { return recording(s.manipulability_tape()); },
           "See sigmaik.singularities.symbolic_manipulability_squared.")

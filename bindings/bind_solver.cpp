@@ -11,9 +11,7 @@ py::array_t<bool> singular_mask(std::uint8_t bits, py::ssize_t size) {
   return out;
 }
 
-}  // namespace
-
-void bind_solver(py::module_& m) {
+void bind_spectrum(py::module_& m) {
   py::class_<Spectrum>(
       m, "Spectrum",
       "Singular value decomposition J = U diag(σ) Vᵀ by one-sided Jacobi rotations.\n\n"
@@ -36,7 +34,9 @@ void bind_solver(py::module_& m) {
           },
           py::arg("J"), "U (m, m), σ (min(m, n),) from large to small, V (n, min(m, n)) of J (m, n), m ≤ 6, n ≤ 16.")
       .def_property_readonly("sweeps", &Spectrum::sweeps, "Sweeps of rotations that the last call took.");
+}
 
+void bind_solution(py::module_& m) {
   py::class_<Solution>(m, "Solution", "Answer of VelocitySolver.solve().")
       .def_property_readonly(
           "qdot", [](const Solution& s) { return to_numpy(s.qdot); }, "(n,) [rad/s or m/s]")
@@ -68,7 +68,9 @@ void bind_solver(py::module_& m) {
         return std::string("Solution(status=") + to_string(s.status) + ", " + std::to_string(s.singular_count()) +
                " singular directions, qdot=" + py::str(to_numpy(s.qdot)).cast<std::string>() + ")";
       });
+}
 
+void bind_velocity_solver(py::module_& m) {
   py::class_<VelocitySolver>(m, "VelocitySolver",
                              "Resolves twists at given Jacobians by one method. Keeps only a warm start.")
       .def(py::init([](const Method& method, double length_scale, const MaybeArray& mask, const std::string& frame) {
@@ -114,7 +116,9 @@ void bind_solver(py::module_& m) {
       .def("reset", &VelocitySolver::reset, "Forgets the warm start.")
       .def_property("method", &VelocitySolver::method, &VelocitySolver::set_method, "The rule; may be changed.")
       .def_property_readonly("length_scale", &VelocitySolver::length_scale, "[m]");
+}
 
+void bind_batch(py::module_& m) {
   m.def(
       "solve_batch",
       [](const Method& method, const ArrayLike& jacobian, const ArrayLike& twist, double length_scale, int threads) {
@@ -136,6 +140,15 @@ void bind_solver(py::module_& m) {
       "Joint velocities (B, n) for B independent problems, J (B, m, n) and twist (B, m), without the GIL.\n\n"
       "Each is solved as by a fresh VelocitySolver, so order and number of threads do not change the answers.\n"
       "Raises Error where a shape is wrong or an entry is not finite.");
+}
+
+}  // namespace
+
+void bind_solver(py::module_& m) {
+  bind_spectrum(m);
+  bind_solution(m);
+  bind_velocity_solver(m);
+  bind_batch(m);
 }
 
 }  // namespace sigmaik::bindings

@@ -44,9 +44,7 @@ double time_argument(double time) {
   return time;
 }
 
-}  // namespace
-
-void bind_target_stream(py::module_& m) {
+void bind_statuses(py::module_& m) {
   py::native_enum<StreamStatus>(m, "StreamStatus", "enum.IntEnum",
                                 "What a target is, ordered from the best to the worst.")
       .value("TRACKING", StreamStatus::Tracking, "as the samples say, or within the horizon of the last one")
@@ -62,7 +60,9 @@ void bind_target_stream(py::module_& m) {
       .value("OUT_OF_ORDER", SampleStatus::OutOfOrder, "refused: its stamp is not later than the last one's")
       .value("INVALID", SampleStatus::Invalid, "refused: more than 10⁹ m away; what is not a pose raises")
       .finalize();
+}
 
+void bind_answers(py::module_& m) {
   py::class_<SampleCounts>(m, "SampleCounts", "How many samples had which fate.")
       .def_readonly("accepted", &SampleCounts::accepted, "Relocated ones included.")
       .def_readonly("relocated", &SampleCounts::relocated)
@@ -87,7 +87,9 @@ void bind_target_stream(py::module_& m) {
         return std::string("Target(status=") + to_string(t.status) +
                ", age=" + py::str(py::float_(t.age)).cast<std::string>() + ")";
       });
+}
 
+void bind_stream(py::module_& m) {
   py::class_<TargetStream> c(
       m, "TargetStream",
       "The way from a sensor to a servo: stamped samples of a pose in, one smooth target a cycle out.\n\n"
@@ -126,6 +128,14 @@ void bind_target_stream(py::module_& m) {
           "The target at a time [s] not before that of the last call; else the last one again.")
       .def_property_readonly("counts", &TargetStream::counts, py::return_value_policy::copy,
                              "How many samples had which fate.");
+}
+
+}  // namespace
+
+void bind_target_stream(py::module_& m) {
+  bind_statuses(m);
+  bind_answers(m);
+  bind_stream(m);
 }
 
 }  // namespace sigmaik::bindings
