@@ -12,15 +12,18 @@ import pytest
 import sigmaik as sk
 from sigmaik_lab.csv_file import save_rows
 from sigmaik_lab.limits import experiment as ex
+from sigmaik_lab.limits.files import save_traces
+from sigmaik_lab.limits.summary import summarize_limits
+from sigmaik_lab.limits.trials import BEYOND_LIMIT, SATURATION, LimitsSettings, Phase, Trial
 from sigmaik_lab.reach.methods import parse_method
 
-SHORT = ex.LimitsSettings(rate=500.0, trials=2, seconds=4.0, pace=0.2)
+SHORT = LimitsSettings(rate=500.0, trials=2, seconds=4.0, pace=0.2)
 ROBOTS = ("ufactory_xarm7", "franka_panda", "ur10")
 
 
 @functools.cache
 def load(robot: str = "ufactory_xarm7", **changes: float) -> ex.LimitsExperiment:
-    return ex.load_limits(robot, ex.LimitsSettings(**{**SHORT.__dict__, **changes}))
+    return ex.load_limits(robot, LimitsSettings(**{**SHORT.__dict__, **changes}))
 
 
 @functools.cache
@@ -44,7 +47,7 @@ def test_no_limit_is_broken(robot, scenario, variant):
         assert np.all(np.abs(speed) <= limits.velocity * (1 + 1e-9))
         acceleration = np.diff(trace.qdot, axis=0, prepend=0.0) * rate
         assert np.all(np.abs(acceleration) <= limits.acceleration * (1 + 1e-9))
-    summary = ex.summarize_limits(drive(robot, scenario, variant))
+    summary = summarize_limits(drive(robot, scenario, variant))
     assert summary.non_finite == 0
     assert (summary.position_broken, summary.speed_broken, summary.acceleration_broken) == (0, 0, 0)
     assert summary.speed_worst <= 1 + 1e-9
@@ -52,19 +55,19 @@ def test_no_limit_is_broken(robot, scenario, variant):
 
 def test_jerk_limits_hold_where_they_are_given():
     for scenario in ex.SCENARIOS:
-        summary = ex.summarize_limits(drive("ufactory_xarm7", scenario, "redistribute", jerk=2000.0))
+        summary = summarize_limits(drive("ufactory_xarm7", scenario, "redistribute", jerk=2000.0))
         assert summary.jerk_broken == 0
         assert 0.9 < summary.jerk_worst <= 1 + 1e-6
         assert summary.acceleration_broken == 0
 
 
 def test_without_limits_and_clamped_they_are():
-    none = ex.summarize_limits(drive("ufactory_xarm7", "beyond limits", "none"))
+    none = summarize_limits(drive("ufactory_xarm7", "beyond limits", "none"))
     assert none.position_broken > 0
-    assert none.position_excess == pytest.approx(ex.BEYOND_LIMIT, abs=0.1)
+    assert none.position_excess == pytest.approx(BEYOND_LIMIT, abs=0.1)
     assert none.limited == none.taken_over == 0.0
     assert none.achieved == pytest.approx(1.0)
-    clamp = ex.summarize_limits(drive("ufactory_xarm7", "beyond limits", "clamp"))
+    clamp = summarize_limits(drive("ufactory_xarm7", "beyond limits", "clamp"))
     assert clamp.position_broken == clamp.speed_broken == 0
     assert clamp.acceleration_broken > 0
     assert clamp.limited > 0.0
@@ -111,8 +114,8 @@ def test_a_figure_by_hand():
         '<child link="b"/><axis xyz="0 0 1"/><limit lower="-1" upper="0.015" velocity="0.5" effort="1"/>'
         "</joint></robot>"
     ).with_limits(acceleration=10.0)
-    settings = ex.LimitsSettings(rate=100.0)
-    trial = ex.Trial("t", np.zeros(1), np.zeros((4, 6)), (ex.Phase("drive", 0, 4),))
+    settings = LimitsSettings(rate=100.0)
+    trial = Trial("t", np.zeros(1), np.zeros((4, 6)), (Phase("drive", 0, 4),))
     experiment = ex.LimitsExperiment("one", chain, parse_method("jparse"), settings, {"teleoperation": (trial,)})
     qdot = np.array([[1.0], [1.0], [0.0], [0.0]])
     q = np.array([[0.0], [0.01], [0.02], [0.02], [0.02]])
@@ -121,7 +124,7 @@ def test_a_figure_by_hand():
     trace = ex.Trace(
         experiment, "teleoperation", trial, "none", q, qdot, np.zeros((4, 6)), np.zeros((4, 3)), rule, held
     )
-    summary = ex.summarize_limits([trace])
+    summary = summarize_limits([trace])
     assert summary.position_broken == 3
     assert summary.position_excess == pytest.approx(0.005)
     assert (summary.speed_broken, summary.speed_worst) == (2, pytest.approx(2.0))
@@ -146,7 +149,7 @@ def test_seeds_decide():
 
 def test_twists_saturate():
     twists = load().trials["teleoperation"][0].commands
-    for rows, longest in zip((slice(0, 3), slice(3, 6)), ex.SATURATION, strict=True):
+    for rows, longest in zip((slice(0, 3), slice(3, 6)), SATURATION, strict=True):
         length = np.linalg.norm(twists[:, rows], axis=1)
         assert length.max() == pytest.approx(longest)
         assert np.mean(length > 0.999 * longest) > 0.1
@@ -180,7 +183,7 @@ def test_targets_are_where_they_are_said_to_be():
 )
 def test_wrong_settings(changes, message):
     with pytest.raises(ValueError, match=message):
-        ex.load_limits("ufactory_xarm7", ex.LimitsSettings(**changes))
+        ex.load_limits("ufactory_xarm7", LimitsSettings(**changes))
 
 
 def test_wrong_names():
@@ -195,12 +198,12 @@ def test_wrong_names():
 
 def test_files(tmp_path):
     traces = drive("ufactory_xarm7", "beyond limits", "scale")
-    rows = [ex.summarize_limits(traces)]
+    rows = [summarize_limits(traces)]
     with save_rows(rows, tmp_path / "a.csv").open(newline="") as stream:
         table = list(csv.DictReader(stream))
     assert table[0]["variant"] == "scale"
     assert float(table[0]["limited"]) == rows[0].limited
-    with np.load(ex.save_traces(traces, tmp_path / "a.npz")) as data:
+    with np.load(save_traces(traces, tmp_path / "a.npz")) as data:
         np.testing.assert_array_equal(data["q_3"], traces[3].q)
         assert data["trials"].tolist() == [trace.trial.name for trace in traces]
         assert json.loads(str(data["phases"]))[0][0] == ["hold", 0, 300]

@@ -8,38 +8,21 @@ Units: m, rad, s; of prismatic joints m where rad is said of joints.
 
 from __future__ import annotations
 
-import dataclasses
-import json
 import math
-import pathlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 import sigmaik as sk
 from sigmaik._types import Array
-from sigmaik.files import write_atomically
 from sigmaik.methods import NamedMethod
 from sigmaik_lab.reach.methods import parse_method
 
-__all__ = [
-    "SCENARIOS",
-    "VARIANTS",
-    "LimitsExperiment",
-    "LimitsSettings",
-    "LimitsSummary",
-    "Phase",
-    "Trace",
-    "Trial",
-    "drive",
-    "load_limits",
-    "save_traces",
-    "shown_trial",
-    "summarize_limits",
-]
+from .trials import LimitsSettings, Trial, beyond_limits, beyond_reach, teleoperation
+
+__all__ = ["SCENARIOS", "VARIANTS", "LimitsExperiment", "Trace", "drive", "load_limits"]
 
 #: Ways to hold limits that the study compares.
 VARIANTS: dict[str, str] = {
@@ -56,61 +39,8 @@ SCENARIOS: dict[str, str] = {
     "teleoperation": "random twists, band-limited and saturating",
 }
 
-BEYOND_REACH = 0.5  #: [m]
-#: [rad or m] distance from the joint limit: of the start inside the limit, and of the target's configuration beyond it.
-BEYOND_LIMIT = 0.3
-SATURATION = (0.5, 1.5)  #: [m/s, rad/s] longest twists of the teleoperation
-BAND = 1.0  #: [Hz] and slower: what a hand does
 #: A cycle counts as limited where the tool's twist misses a larger part of the rule's twist.
 MISSED = 1e-3
-#: An excess below this part of the limit is the rounding of finite differences.
-TOLERANCE = 1e-7
-
-
-@dataclass(frozen=True)
-class LimitsSettings:
-    """Rate, gains and duration of the loop, and limits that replace those of the arm."""
-
-    rate: float = 1000.0  #: [Hz]
-    trials: int = 3  #: directions that the target out of reach is tried in
-    seconds: float = 60.0  #: of teleoperation
-    pace: float = 1.0  #: the other scenarios' times are multiplied with it
-    seed: int = 0
-    gain_linear: float = 5.0  #: [1/s] position error to velocity
-    gain_angular: float = 5.0  #: [1/s] orientation error to angular velocity
-    max_linear_error: float = 0.25  #: [m] longer errors are shortened to it
-    max_angular_error: float = 1.0  #: [rad]
-    soft_start: float = 0.1  #: [s]
-    acceleration: float | None = None  #: limit of all joints; None: the arm's own
-    jerk: float | None = None  #: limit of all joints; None: the arm's own
-
-
-@dataclass(frozen=True)
-class Phase:
-    """A stretch of a trial."""
-
-    name: str  #: "reach", "hold", "wander", "return", "drive"
-    begin: int  #: cycle
-    end: int
-
-
-@dataclass(frozen=True)
-class Trial:
-    """Commands for one start: poses (N, 4, 4), or twists (N, 6)."""
-
-    name: str
-    start: Array  #: (n,)
-    commands: Array
-    phases: tuple[Phase, ...]
-
-    @property
-    def by_pose(self) -> bool:
-        """Whether the commands are poses."""
-        return self.commands.ndim == 3
-
-    def phase(self, name: str) -> slice:
-        """Cycles of the phase; empty where there is none of that name."""
-        return next((slice(p.begin, p.end) for p in self.phases if p.name == name), slice(0, 0))
 
 
 @dataclass(frozen=True)
@@ -162,7 +92,7 @@ class Trace:
         out: Array = np.concatenate(
             [
                 np.einsum("bij,bj->bi", self.experiment.chain.jacobian(self.q[:-1][part]), self.qdot[part])
-                for part in _parts(len(self.qdot))
+                for part in parts(len(self.qdot))
             ]
         )
         return out
@@ -178,45 +108,6 @@ class Trace:
         """(N, n) of the command, by differences, from rest."""
         out: Array = np.diff(self.acceleration, axis=0, prepend=0.0) * self.experiment.settings.rate
         return out
-
-
-@dataclass(frozen=True)
-class LimitsSummary:
-    """A variant in a scenario, all trials together. A figure is NaN where no sample belongs to the figure.
-
-    Broken limits are counted per joint and cycle; worst is the largest excess of positions [rad or m], and
-    the largest ratio to the limit of the others. What limits cost is measured against the rule alone in the same
-    state, in the cycles where limits changed the tool's motion.
-    """
-
-    scenario: str
-    variant: str
-    cycles: int
-    non_finite: int  #: cycles with a number that is none
-    position_broken: int
-    position_excess: float  #: [rad or m]
-    speed_broken: int
-    speed_worst: float
-    acceleration_broken: int
-    acceleration_worst: float
-    jerk_broken: int
-    jerk_worst: float
-    limited: float  #: share of cycles in which limits changed the tool's motion
-    taken_over: float  #: share of cycles in which limits changed the joints' motion, but not the tool's
-    achieved: float  #: part of the rule's twist, along itself, over all cycles
-    direction_error: float  #: [rad] angle between the rule's and the achieved velocity of the tool, median
-    direction_error_worst: float  #: [rad] the same, of 95 % of these cycles
-    turning_error: float  #: [rad/s] rotation that the rule did not ask for, root mean square
-    acceleration_peak: float  #: [rad/s² or m/s²]
-    acceleration_rms: float
-    hold_error: float  #: [m] distance to the target at the end of a hold, median of the trials
-    hold_angle: float  #: [rad] the same of the orientation
-    rest_speed: float  #: [rad/s or m/s] root mean square of q̇ at the end of a hold
-    rest_speed_peak: float  #: the largest |q̇| then
-    resume_time: float  #: [s] after release until a tenth of the way back is done, the longest
-    resume_speed: float  #: [rad/s or m/s] largest |q̇| in the first second after release
-    returned: int  #: trials that came back to where they started, within 1 mm and 0.01 rad
-    trials: int  #: trials that were to come back
 
 
 def load_limits(
@@ -249,90 +140,11 @@ def load_limits(
                 raise ValueError(f"{name} must be positive, not {limit:g}")
             chain = chain.with_limits(**{name: limit})
     trials = {
-        "beyond reach": tuple(_beyond_reach(chain, home, settings)),
-        "beyond limits": tuple(_beyond_limits(chain, home, settings)),
-        "teleoperation": (_teleoperation(home, settings),),
+        "beyond reach": tuple(beyond_reach(chain, home, settings)),
+        "beyond limits": tuple(beyond_limits(chain, home, settings)),
+        "teleoperation": (teleoperation(home, settings),),
     }
     return LimitsExperiment(label, chain, parse_method(method), settings, trials)
-
-
-# --- the trials
-
-
-def _beyond_reach(chain: sk.Chain, home: Array, settings: LimitsSettings) -> Iterator[Trial]:
-    rng = np.random.default_rng([settings.seed, 1])
-    sampled = (chain.random_configuration(rng) for _ in range(2000))
-    reach = max(float(np.linalg.norm(chain.pose(q)[:3, 3])) for q in sampled)
-    start = chain.pose(home)
-    for i in range(settings.trials):
-        direction = start[:3, 3] / max(1e-9, float(np.linalg.norm(start[:3, 3])))
-        if i > 0:  # the first straight on, the others to the sides
-            direction = direction + rng.normal(scale=0.5, size=3)
-            direction /= np.linalg.norm(direction)
-        counts = [_count(settings, settings.pace * s) for s in (0.5, 8.0, 5.0, 8.0)]
-        far = start.copy()
-        far[:3, 3] = (reach + BEYOND_REACH) * direction
-        poses = np.concatenate(
-            [np.broadcast_to(p, (c, 4, 4)) for p, c in zip((start, far, far, start), counts, strict=True)]
-        )
-        wander = slice(sum(counts[:2]), sum(counts[:3]))
-        fade = np.sin(np.linspace(0.0, math.pi, counts[2]))[:, None]
-        poses[wander, :3, 3] += 0.3 * fade * _noise(rng, counts[2], 3, settings.rate)
-        phases = _phases(("start", "hold", "wander", "return"), counts)
-        yield Trial(f"direction {i + 1}", home, poses, phases)
-
-
-def _beyond_limits(chain: sk.Chain, home: Array, settings: LimitsSettings) -> Iterator[Trial]:
-    rng = np.random.default_rng([settings.seed, 2])
-    for joint, name in enumerate(chain.joint_names):
-        for sign, limit in ((-1.0, chain.limits.lower[joint]), (1.0, chain.limits.upper[joint])):
-            if not math.isfinite(limit):
-                continue
-            start = np.clip(home + rng.uniform(-0.2, 0.2, chain.dof), chain.limits.lower, chain.limits.upper)
-            start[joint] = limit - sign * min(
-                BEYOND_LIMIT, 0.25 * (chain.limits.upper[joint] - chain.limits.lower[joint])
-            )
-            beyond = start.copy()
-            beyond[joint] = limit + sign * BEYOND_LIMIT
-            counts = [_count(settings, settings.pace * s) for s in (3.0, 3.0)]
-            poses = np.concatenate(
-                [np.broadcast_to(chain.pose(q), (c, 4, 4)) for q, c in zip((beyond, start), counts, strict=True)]
-            )
-            side = "lower" if sign < 0.0 else "upper"
-            yield Trial(f"{name} {side}", start, poses, _phases(("hold", "return"), counts))
-
-
-def _teleoperation(home: Array, settings: LimitsSettings) -> Trial:
-    rng = np.random.default_rng([settings.seed, 3])
-    count = _count(settings, settings.seconds)
-    twists = _noise(rng, count, 6, settings.rate)
-    for rows, longest in ((slice(0, 3), SATURATION[0]), (slice(3, 6), SATURATION[1])):
-        twists[:, rows] *= longest
-        length = np.linalg.norm(twists[:, rows], axis=1, keepdims=True)
-        twists[:, rows] /= np.maximum(1.0, length / longest)
-    return Trial("twists", home, twists, _phases(("drive",), [count]))
-
-
-def _noise(rng: np.random.Generator, count: int, columns: int, rate: float) -> Array:
-    """Band-limited noise (count, columns), of mean 0 and variance 1, up to BAND."""
-    spectrum = rng.normal(size=(count // 2 + 1, columns)) + 1j * rng.normal(size=(count // 2 + 1, columns))
-    frequency = np.fft.rfftfreq(count, 1.0 / rate)
-    spectrum[(frequency > max(BAND, 2.0 * rate / count)) | (frequency == 0.0)] = 0.0
-    noise: Array = np.fft.irfft(spectrum, count, axis=0)
-    noise /= np.maximum(noise.std(axis=0), 1e-300)
-    return noise
-
-
-def _count(settings: LimitsSettings, seconds: float) -> int:
-    return max(4, round(seconds * settings.rate))
-
-
-def _phases(names: Sequence[str], counts: Sequence[int]) -> tuple[Phase, ...]:
-    ends = np.cumsum(counts)
-    return tuple(Phase(n, int(e - c), int(e)) for n, c, e in zip(names, counts, ends, strict=True))
-
-
-# --- the loop
 
 
 def drive(
@@ -347,7 +159,7 @@ def drive(
         raise ValueError(f"no variant '{variant}'; there are {', '.join(VARIANTS)}")
     loop = _clamped if variant == "clamp" else _served
     q, qdot, error, held = loop(experiment, trial, variant, progress)
-    tip: Array = np.concatenate([experiment.chain.pose(q[:-1][p])[:, :3, 3] for p in _parts(len(qdot))])
+    tip: Array = np.concatenate([experiment.chain.pose(q[:-1][p])[:, :3, 3] for p in parts(len(qdot))])
     rule = _rule(experiment, trial, q[:-1], error)
     return Trace(experiment, scenario, trial, variant, q, qdot, error, tip, rule, held)
 
@@ -441,139 +253,13 @@ def _twists(settings: LimitsSettings, error: Array, first: int = 0) -> Array:
 def _rule(experiment: LimitsExperiment, trial: Trial, q: Array, error: Array) -> Array:
     commands = _twists(experiment.settings, error) if trial.by_pose else trial.commands
     twists = np.empty((len(q), 6))
-    for part in _parts(len(q)):
+    for part in parts(len(q)):
         jacobian = experiment.chain.jacobian(q[part])
         qdot = sk.solve_batch(experiment.method.method, jacobian, commands[part])
         twists[part] = np.einsum("bij,bj->bi", jacobian, qdot)
     return twists
 
 
-def _parts(count: int, size: int = 10_000) -> Iterator[slice]:
+def parts(count: int, size: int = 10_000) -> Iterator[slice]:
+    """Slices of at most `size` samples, which bound the memory that a computation takes."""
     return (slice(i, min(i + size, count)) for i in range(0, count, size))
-
-
-# --- figures
-
-
-def shown_trial(scenario: str, trials: Sequence[Trial]) -> int:
-    """Which trial of a scenario makes a picture: the second direction, the second joint's upper limit."""
-    names = [trial.name for trial in trials]
-    upper = [i for i, name in enumerate(names) if name.endswith("upper")]
-    return upper[min(1, len(upper) - 1)] if scenario == "beyond limits" and upper else min(1, len(names) - 1)
-
-
-def summarize_limits(traces: Sequence[Trace]) -> LimitsSummary:
-    """All trials of one variant in one scenario."""
-    first = traces[0]
-    chain, rate = first.experiment.chain, first.experiment.settings.rate
-    limits = chain.limits
-    outside = [np.maximum(limits.lower - t.q, t.q - limits.upper) for t in traces]
-    speed = [np.abs(t.qdot) / limits.velocity for t in traces]
-    acceleration = [np.abs(t.acceleration) / limits.acceleration for t in traces]
-    jerk = [np.abs(t.jerk) / limits.jerk for t in traces]
-
-    limited, held = np.concatenate([t.limited for t in traces]), np.concatenate([t.held for t in traces])
-    rule = np.concatenate([t.rule for t in traces])
-    achieved = np.concatenate([t.achieved for t in traces])
-    asked = np.linalg.norm(rule[:, :3], axis=1)
-    moved = np.linalg.norm(achieved[:, :3], axis=1)
-    # The direction of a velocity near zero is rounding.
-    judged = limited & (asked > 1e-3) & (moved > 1e-4)
-    along = np.sum(rule[:, :3] * achieved[:, :3], axis=1)[judged] / (asked * moved)[judged]
-    angle = np.arccos(np.clip(along, -1.0, 1.0))
-    turning = np.linalg.norm(achieved[limited, 3:] - _along(achieved, rule)[limited, 3:], axis=1)
-    qddot = np.concatenate([t.acceleration for t in traces])
-
-    holds = [t.trial.phase("hold") for t in traces]
-    tails = [t.qdot[h][-max(1, (h.stop - h.start) // 4) :] for t, h in zip(traces, holds, strict=True) if h.stop]
-    rest = np.concatenate(tails) if tails else np.full((1, 1), math.nan)
-    held_at = [t.error[h.stop - 1] for t, h in zip(traces, holds, strict=True) if h.stop]
-    returns = [(t, t.trial.phase("return")) for t in traces]
-    returns = [(t, phase) for t, phase in returns if phase.stop]
-    resumed = [_resume(t.error[phase], rate) for t, phase in returns]
-    early = [float(np.abs(t.qdot[p][: round(rate)]).max()) for t, p in returns]
-    ends = [t.error[-1] for t, _ in returns]
-    return LimitsSummary(
-        scenario=first.scenario,
-        variant=first.variant,
-        cycles=len(limited),
-        non_finite=sum(int((~np.isfinite(t.q[1:]) | ~np.isfinite(t.qdot)).any(axis=1).sum()) for t in traces),
-        position_broken=sum(int((o > TOLERANCE).sum()) for o in outside),
-        position_excess=max(0.0, *(float(o.max()) for o in outside)),
-        speed_broken=_broken(speed),
-        speed_worst=max(float(x.max()) for x in speed),
-        acceleration_broken=_broken(acceleration),
-        acceleration_worst=max(float(x.max()) for x in acceleration),
-        jerk_broken=_broken(jerk),
-        jerk_worst=max(float(x.max()) for x in jerk),
-        limited=float(limited.mean()),
-        taken_over=float((held & ~limited).mean()),
-        achieved=float(np.sum(rule * achieved) / max(np.sum(rule * rule), 1e-300)),
-        direction_error=_quantile(angle, 0.5),
-        direction_error_worst=_quantile(angle, 0.95),
-        turning_error=float(np.sqrt(np.mean(turning**2))) if len(turning) else math.nan,
-        acceleration_peak=float(np.abs(qddot).max()),
-        acceleration_rms=float(np.sqrt(np.mean(qddot**2))),
-        hold_error=_quantile(np.array([float(np.linalg.norm(e[:3])) for e in held_at]), 0.5),
-        hold_angle=_quantile(np.array([float(np.linalg.norm(e[3:])) for e in held_at]), 0.5),
-        rest_speed=float(np.sqrt(np.mean(rest**2))),
-        rest_speed_peak=float(np.abs(rest).max()),
-        resume_time=max(resumed, default=math.nan),
-        resume_speed=max(early, default=math.nan),
-        returned=sum(bool(np.linalg.norm(e[:3]) < 1e-3 and np.linalg.norm(e[3:]) < 1e-2) for e in ends),
-        trials=len(ends),
-    )
-
-
-def _broken(ratios: Sequence[Array]) -> int:
-    return sum(int((x > 1.0 + TOLERANCE).sum()) for x in ratios)
-
-
-def _along(achieved: Array, rule: Array) -> Array:
-    """(N, 6) the projections of the achieved twists on the rule's twists."""
-    whole = np.maximum(np.sum(rule * rule, axis=1, keepdims=True), 1e-300)
-    along: Array = np.sum(rule * achieved, axis=1, keepdims=True) / whole * rule
-    return along
-
-
-def _resume(error: Array, rate: float) -> float:
-    size = np.linalg.norm(error[:, :3], axis=1) + np.linalg.norm(error[:, 3:], axis=1)
-    done = np.flatnonzero(size <= 0.9 * size[0])
-    return float(done[0]) / rate if len(done) else math.inf
-
-
-def _quantile(values: Array, part: float) -> float:
-    return float(np.quantile(values, part)) if len(values) else math.nan
-
-
-# --- files
-
-
-def save_traces(traces: Sequence[Trace], file: str | pathlib.Path) -> pathlib.Path:
-    """An npz file of one variant in one scenario, which numpy.load(file) reads.
-
-    Per trial i q_i (N + 1, n), qdot_i (N, n), error_i (N, 6), tip_i (N, 3), rule_i (N, 6), held_i (N,), as in
-    `Trace`; trials, phases (JSON), joint_names, limits (5, n: lower, upper, velocity, acceleration, jerk),
-    settings (JSON) and version.
-    """
-    first = traces[0]
-    limits = first.experiment.chain.limits
-    arrays: dict[str, NDArray[np.generic]] = {}
-    for i, trace in enumerate(traces):
-        for name in ("q", "qdot", "error", "tip", "rule", "held"):
-            arrays[f"{name}_{i}"] = getattr(trace, name)
-    arrays["trials"] = np.array([trace.trial.name for trace in traces])
-    arrays["phases"] = np.array(
-        json.dumps([[dataclasses.astuple(phase) for phase in trace.trial.phases] for trace in traces])
-    )
-    arrays["joint_names"] = np.array(first.experiment.chain.joint_names)
-    arrays["limits"] = np.array(
-        [limits.lower, limits.upper, limits.velocity, limits.acceleration, limits.jerk], dtype=np.float64
-    )
-    arrays["settings"] = np.array(json.dumps(dataclasses.asdict(first.experiment.settings)))
-    arrays["version"] = np.array(sk.__version__)
-
-    def write(stream: BinaryIO) -> None:
-        np.savez_compressed(stream, **arrays)  # type: ignore[arg-type]
-
-    return write_atomically(pathlib.Path(file), write)

@@ -12,20 +12,11 @@ from sigmaik_lab.options import add_arm, add_output
 from sigmaik_lab.report import Csv, Picture, Report, Series
 from sigmaik_lab.study import Progress
 
-from .experiment import (
-    SCENARIOS,
-    VARIANTS,
-    LimitsExperiment,
-    LimitsSettings,
-    LimitsSummary,
-    Trace,
-    drive,
-    load_limits,
-    save_traces,
-    shown_trial,
-    summarize_limits,
-)
+from .experiment import SCENARIOS, VARIANTS, LimitsExperiment, Trace, drive, load_limits
+from .files import save_traces
+from .summary import LimitsSummary, summarize_limits
 from .table import broken_table, cost_table, hold_table
+from .trials import LimitsSettings, shown_trial
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from sigmaik_lab.report import Cell, Table, bold, compact, red
 
-from .experiment import LimitsSummary
+from .summary import LimitsSummary
 
 __all__ = ["broken_table", "cost_table", "hold_table"]
 
