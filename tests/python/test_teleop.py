@@ -392,14 +392,41 @@ def test_links_without_meshes_get_shapes():
     assert "mesh" not in drawn
 
 
+def test_a_target_is_checked_once_and_then_passed_on(session, monkeypatch):
+    from sigmaik.teleop.target import TargetPose
+
+    target = TargetPose.of(moved(session, 0.01, 0.0, 0.0))
+    sheared, scaled = np.eye(4), np.diag([2.0, 1.0, 1.0, 1.0])
+    sheared[3, 0] = 1.0
+    for wrong in (np.eye(3), np.full((4, 4), np.nan), sheared, scaled):
+        with pytest.raises(ValueError, match="target"):
+            TargetPose.of(wrong)
+    monkeypatch.setattr(sk, "pose_error", None)  # a second check would fail
+    session.follow(target)
+    np.testing.assert_array_equal(session.goal, target.matrix)
+
+
+def test_settings_parse_a_method_once():
+    settings = Settings(method="dls:damping=0.05")
+    assert settings.rule() is settings.rule()
+    assert settings.with_(gamma=0.2).rule() is not settings.rule()
+    assert settings.rule(500.0) is not settings.rule(1000.0)
+
+
 def test_the_pages_target_is_checked():
     pytest.importorskip("viser")
-    from sigmaik.teleop.scene import pose_of, singular_directions
+    from sigmaik.teleop.scene import singular_directions
+    from sigmaik.teleop.target import TargetPose
 
-    np.testing.assert_allclose(pose_of((1.0, 2.0, 3.0), (1.0, 0.0, 0.0, 0.0))[:3, 3], (1.0, 2.0, 3.0))
+    target = TargetPose.from_page((1.0, 2.0, 3.0), (1.0, 0.0, 0.0, 0.0))
+    np.testing.assert_allclose(target.matrix[:3, 3], (1.0, 2.0, 3.0))
+    np.testing.assert_allclose(target.moved_to((4.0, 5.0, 6.0)).matrix[:3, 3], (4.0, 5.0, 6.0))
+    for position in ((0.0, 0.0), (0.0, np.inf, 0.0), (0.0, 0.0, 101.0)):
+        with pytest.raises(ValueError, match="target"):
+            target.moved_to(position)
     for position, wxyz in (((1.0, np.nan, 0.0), (1, 0, 0, 0)), ((0, 0, 0), (0, 0, 0, 0)), ((0, 0), (1, 0, 0, 0))):
         with pytest.raises(ValueError, match="page's target"):
-            pose_of(position, wxyz)
+            TargetPose.from_page(position, wxyz)
     arm = sk.robots.load("franka_panda")
     q = np.zeros(7)  # stretched out
     linear, angular, sigma = singular_directions(arm.jacobian(q), 0.1, 1.0)

@@ -1,7 +1,7 @@
 """The page in the browser: a `Session` drawn, driven, changed, recorded and replayed (extra `viewer`).
 
-Everything that comes from the page is checked as any other input. The arm stops when the browser that drives it is
-gone, or does not answer: a pose is said again only while it does, and goes stale otherwise.
+Input from the page is checked once, where it comes in. The arm stops if the browser that drives the arm is gone or does
+not answer: the page repeats a target only while the browser answers, and a target that is not repeated goes stale.
 """
 
 from __future__ import annotations
@@ -24,21 +24,22 @@ from sigmaik._types import Array
 from . import gauges
 from .devices import DEVICES, TwistDevice, open_device
 from .episode import Episode
-from .scene import Scene, pose_of
+from .scene import Scene
 from .session import Session
+from .target import TargetPose
 
 if TYPE_CHECKING:
     import viser
 
 __all__ = ["Page"]
 
-DRAWN = 30.0  #: [Hz] the arm
-GAUGES = 10.0  #: [Hz] what stands beside it
-HEARTBEAT = 0.3  #: [s] between questions to the browser
-POLLED = 100.0  #: [Hz] devices
+DRAWN = 30.0  #: [Hz] frames of the arm
+GAUGES = 10.0  #: [Hz] updates of the gauges
+HEARTBEAT = 0.3  #: [s] between two questions to the browser
+POLLED = 100.0  #: [Hz] readings of the devices
 
 _AXES = ("x", "y", "z", "roll", "pitch", "yaw")
-#: Keys that nudge the tool along an axis, forth and back.
+#: Keys that move the tool a little along an axis, forth and back.
 _KEYS = (("W", "S"), ("A", "D"), ("R", "F"), ("U", "O"), ("I", "K"), ("J", "L"))
 _ROWS = ("vx", "vy", "vz", "ωx", "ωy", "ωz")
 
@@ -70,7 +71,7 @@ class Page:
             self._server = viser.ViserServer(host=host, port=port, label=f"sigmaik {session.name}", verbose=False)
         self.url = f"http://{self._server.get_host()}:{self._server.get_port()}"
         self._scene = Scene(self._server, session)
-        self._driver: int | None = None  # the client whose pose is followed
+        self._driver: int | None = None  # the client whose target the arm follows
         self._device: TwistDevice | None = None
         self._replay: _Replay | None = None
         self._closed = threading.Event()
@@ -129,7 +130,7 @@ class Page:
         @self._scene.target.on_update
         def _(event: Any) -> None:
             target = self._scene.target
-            self._guard(event, lambda: self._follow(event, pose_of(target.position, target.wxyz)))
+            self._guard(event, lambda: self._follow(event, TargetPose.from_page(target.position, target.wxyz)))
 
     def _build_drive(self) -> None:
         gui = self._server.gui
@@ -185,7 +186,7 @@ class Page:
         gui, settings = self._server.gui, self.session.settings
         family = self.session.settings.rule().family
         names = methods.ALL
-        # As it was given, with parameters, where it has some.
+        # The method as it was given, if it has parameters.
         given = settings.method if settings.method not in names else None
         with gui.add_folder("Rule"):
             method = gui.add_dropdown("method", (*((given,) if given else ()), *names), initial_value=given or family)
@@ -243,10 +244,10 @@ class Page:
             self._play = play
 
     def _bind(self, handle: Any, setting: str, convert: Callable[[Any], object]) -> None:
-        """A control that changes a setting."""
+        """Connects a control to a setting."""
 
         def change(event: Any) -> None:
-            if event.client is not None:  # set by us otherwise
+            if event.client is not None:  # otherwise the value was set by this program
                 self._guard(event, lambda: self.session.configure(**{setting: convert(handle.value)}))
 
         handle.on_update(change)
@@ -254,10 +255,10 @@ class Page:
     # --- what the page asked for
 
     def _guard(self, event: Any, do: Callable[[], None]) -> None:
-        """Does it, and tells the page where it is refused."""
+        """Calls `do`, and tells the page the reason if the request is refused."""
         try:
             do()
-        except Exception as error:  # whatever a page sends, the server goes on
+        except Exception as error:  # whatever a page sends, the server must go on
             self._say(event, "refused", " ".join(str(error).split()), "red")
 
     def _say(self, event: Any, title: str, text: str, color: str = "gray") -> None:
@@ -265,21 +266,17 @@ class Page:
         if client is not None:
             client.add_notification(title, text, color=color, auto_close_seconds=8.0)
 
-    def _follow(self, event: Any, target: Array) -> None:
+    def _follow(self, event: Any, target: TargetPose) -> None:
         if self._replay is not None:
             raise ValueError("a recording is replayed: end that first")
         self._driver = event.client_id
         self.session.follow(target)
-        self._scene.place_target(target)
-        self._position.value = tuple(np.round(target[:3, 3], 3).tolist())
+        self._scene.place_target(target.matrix)
+        self._position.value = tuple(np.round(target.matrix[:3, 3], 3).tolist())
 
-    def _moved_target(self, position: Any) -> Array:
-        target = pose_of(self._scene.target.position, self._scene.target.wxyz)
-        moved: Array = np.array(position, dtype=np.float64)
-        if moved.shape != (3,) or not np.isfinite(moved).all():
-            raise ValueError("the target's position must be three finite numbers")
-        target[:3, 3] = moved
-        return target
+    def _moved_target(self, position: Any) -> TargetPose:
+        target = self._scene.target
+        return TargetPose.from_page(target.position, target.wxyz).moved_to(position)
 
     def _jog(self, axis: Array, event: Any) -> None:
         def jog() -> None:
@@ -357,7 +354,7 @@ class Page:
             try:
                 self._draw_once(ticks)
             except Exception:
-                if self._closed.is_set():  # the server went first
+                if self._closed.is_set():  # the server was closed before this thread
                     return
                 self.session.hold()
                 self._closed.set()
@@ -407,7 +404,7 @@ class Page:
             self._recorded.content = f"recording: {session.recorded} cycles{full}"
 
     def _watch(self) -> None:
-        """Asks the browser that drives, and says its pose again while it answers."""
+        """Asks the browser that drives for an answer, and repeats the target while the browser answers."""
         while not self._closed.wait(HEARTBEAT):
             client = self._server.get_clients().get(self._driver) if self._driver is not None else None
             if client is None or self.session.goal is None:
@@ -417,12 +414,12 @@ class Page:
                 client.local_storage.get_item("sigmaik", timeout=patience)
             except (TimeoutError, RuntimeError):
                 self._driver = None
-                self._hold()  # until a new target is given
+                self._hold()  # the arm holds until a new target is given
             else:
                 self.session.refresh()
 
     def _lost(self, client: viser.ClientHandle) -> None:
-        """A browser is gone."""
+        """Stops the arm if the browser that drove it, or the last browser, is gone."""
         if client.client_id == self._driver or not self._server.get_clients():
             self._driver = None
             self._hold()
@@ -455,7 +452,7 @@ class _Replay:
         self.episode, self.name, self._begun = episode, name, begun
 
     def sample(self) -> Any:
-        """The sample of now; None at the end."""
+        """The sample to show now; None after the last one."""
         at = int((time.monotonic() - self._begun) / self.episode.dt)
         return self.episode.samples[at] if at < len(self.episode) else None
 
@@ -469,6 +466,6 @@ def _number(value: Any, least: float, most: float) -> float:
 
 @contextlib.contextmanager
 def _quiet() -> Any:
-    """Without the library's own banner."""
+    """Suppresses the banner of viser."""
     with contextlib.redirect_stdout(io.StringIO()):
         yield

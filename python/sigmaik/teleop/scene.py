@@ -17,7 +17,7 @@ from .session import Session
 if TYPE_CHECKING:
     import viser
 
-__all__ = ["Scene", "pose_of", "singular_directions"]
+__all__ = ["Scene", "singular_directions"]
 
 #: Colours of the tool's trace, by status.
 _TRACE = {
@@ -29,22 +29,6 @@ _TRACE_LENGTH = 240
 _ASKED, _ACHIEVED = (34, 139, 230), (47, 158, 68)
 _LINEAR, _ANGULAR = (214, 51, 108), (151, 53, 214)
 _NOTHING = np.zeros((1, 2, 3), dtype=np.float32)
-
-
-def pose_of(position: Any, wxyz: Any) -> Array:
-    """(4, 4) of what a page says; ValueError where it is no pose."""
-    from viser import transforms
-
-    position, wxyz = np.array(position, dtype=np.float64), np.array(wxyz, dtype=np.float64)
-    if position.shape != (3,) or wxyz.shape != (4,) or not (np.isfinite(position).all() and np.isfinite(wxyz).all()):
-        raise ValueError("the page's target is not three and four finite numbers")
-    size = np.linalg.norm(wxyz)
-    if abs(size - 1.0) > 1e-3:
-        raise ValueError(f"the page's target has a quaternion of length {size:g}")
-    pose: Array = np.eye(4)
-    pose[:3, :3] = transforms.SO3(wxyz=wxyz / size).as_matrix()
-    pose[:3, 3] = position
-    return pose
 
 
 def singular_directions(jacobian: Array, gamma: float, length_scale: float) -> tuple[Array, Array, NDArray[np.float64]]:

@@ -14,21 +14,22 @@ from sigmaik._types import Array
 
 from .episode import Arm, Episode
 from .settings import Settings
+from .target import TargetPose
 
 __all__ = ["Session"]
 Samples = NDArray[np.void]
 
-#: Joints whose acceleration limit nobody gave may do this [rad/s² or m/s²]: a hand's command is never smooth.
+#: [rad/s² or m/s²] Limit of joints without an acceleration limit: commands of a hand are never smooth.
 ACCELERATION = 10.0
-#: The longest recording [cycles]: ten minutes at 1 kHz, half a gigabyte.
+#: [cycles] The longest recording: ten minutes at 1 kHz, half a gigabyte.
 LONGEST_RECORDING = 600_000
 
 
 class Session:
     """A simulated arm, its servo in a thread, and what is asked of it. Its functions may be called from any thread.
 
-    What follows a pose or a twist goes stale: the arm stops within its limits unless the command is said again in
-    time. `refresh` says a pose again; whoever watches over the commander calls it while the commander is alive.
+    Commands go stale: the arm stops within its limits unless the command is repeated in time. `refresh` repeats a pose;
+    the code that watches over the commander calls `refresh` while the commander is alive.
     """
 
     def __init__(
@@ -84,8 +85,9 @@ class Session:
         self._lock = threading.RLock()
         self._latest: Samples | None = None
         self._recorded: list[Samples] | None = None
-        self._from = 0  # the configuration with which the recording begins
-        self._before: tuple[Array, Array] | None = None  # q and q̇ ahead of it
+        self._recorded_cycles = 0
+        self._from = 0  # number of the configuration with which the recording begins
+        self._before: tuple[Array, Array] | None = None  # q and q̇ before the recording
         self._history: dict[int, Settings] = {0: self._settings}
 
     def __enter__(self) -> Session:
@@ -97,19 +99,15 @@ class Session:
 
     # --- commands
 
-    def follow(self, target: ArrayLike) -> None:
-        """Drives the tip to a pose (4, 4) in base. ValueError where it is none, or too far away to be meant."""
-        pose: Array = np.array(target, dtype=np.float64)
-        if pose.shape != (4, 4) or not np.isfinite(pose).all():
-            raise ValueError("the target must be a 4×4 pose of finite numbers")
-        if np.abs(pose[:3, 3]).max() > 100.0:
-            raise ValueError("the target is more than 100 m away")
+    def follow(self, target: ArrayLike | TargetPose) -> None:
+        """Drives the tip to a pose (4, 4) in base. ValueError if the target is no pose, or more than 100 m away."""
+        pose = TargetPose.of(target).matrix
         with self._lock:
             self._loop.follow(pose, self.pose_timeout)
             self._goal = pose
 
     def refresh(self) -> None:
-        """Says the pose that is followed again, so that it does not go stale."""
+        """Repeats the pose that the arm follows, so that the pose does not go stale."""
         with self._lock:
             if self._goal is not None:
                 self._loop.follow(self._goal, self.pose_timeout)
@@ -167,13 +165,15 @@ class Session:
 
     def _record(self, samples: Samples) -> None:
         assert self._recorded is not None
-        first = int(np.searchsorted(samples["configuration"], self._from))  # configurations only ever grow
+        first = int(np.searchsorted(samples["configuration"], self._from))  # numbers of configurations only grow
         if first == len(samples):
             return
         if not self._recorded:
             before = samples[first - 1] if first > 0 else self.latest
             self._before = (before["q"].copy(), before["qdot"].copy()) if before is not None else None
-        self._recorded.append(samples[first : first + self.longest_recording - self.recorded])
+        kept = samples[first : first + self.longest_recording - self._recorded_cycles]
+        self._recorded.append(kept)
+        self._recorded_cycles += len(kept)
 
     @property
     def latest(self) -> Any:
@@ -199,7 +199,7 @@ class Session:
     @property
     def recorded(self) -> int:
         """Cycles recorded so far."""
-        return sum(map(len, self._recorded or []))
+        return self._recorded_cycles
 
     @property
     def recording_full(self) -> bool:
@@ -212,11 +212,11 @@ class Session:
             if self._recorded is not None:
                 raise ValueError("it is recording already")
             self.read()
-            # A servo without a past: so that the recording can be played again to the bit.
+            # The recording begins with a fresh servo, so that a replay gives the same bits.
             servo = self._settings.servo(self.chain, self._dt, self.home)
             self._from = self._loop.configure(servo)
             self._history[self._from] = self._settings
-            self._recorded = []
+            self._recorded, self._recorded_cycles = [], 0
 
     def stop_recording(self) -> Episode:
         """What was recorded. ValueError where nothing was."""
@@ -225,7 +225,8 @@ class Session:
                 raise ValueError("it is not recording")
             self.read()
             recorded, self._recorded = self._recorded, None
-            if not sum(map(len, recorded)):
+            cycles, self._recorded_cycles = self._recorded_cycles, 0
+            if cycles == 0:
                 raise ValueError("no cycle was recorded")
             samples: Samples = np.concatenate(recorded)
             start = samples[0]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass, fields, replace
 from typing import Literal
@@ -55,16 +56,8 @@ class Settings:
         return replace(self, **changes)  # type: ignore[arg-type]
 
     def rule(self, rate: float = 1000.0) -> methods.NamedMethod:
-        """The method at a servo's rate [Hz]."""
-        defaults = {
-            "gamma": self.gamma,
-            "gain_linear": self.singular_gain,
-            "gain_angular": self.singular_gain,
-            "singular_posture": self.singular_posture,
-            # Buss and Kim let a joint turn by 45° an update, whatever the update's rate.
-            "max_speed": math.pi / 4.0 * rate,
-        }
-        return methods.parse_named(self.method, defaults)
+        """The method at a servo's rate [Hz]. The page asks at each frame, so the last answers are kept."""
+        return _rule(self.method, self.gamma, self.singular_gain, self.singular_posture, rate)
 
     def servo(self, chain: sk.Chain, dt: float, posture: ArrayLike) -> sk.Servo:
         """A servo with these settings, not started."""
@@ -87,3 +80,16 @@ class Settings:
             mask=self.mask,
             frame=self.frame,
         )
+
+
+@functools.lru_cache(maxsize=64)
+def _rule(method: str, gamma: float, gain: float, posture: bool, rate: float) -> methods.NamedMethod:
+    defaults = {
+        "gamma": gamma,
+        "gain_linear": gain,
+        "gain_angular": gain,
+        "singular_posture": posture,
+        # Buss and Kim allow a joint to turn by 45° in an update, whatever the rate of the updates is.
+        "max_speed": math.pi / 4.0 * rate,
+    }
+    return methods.parse_named(method, defaults)
