@@ -144,7 +144,8 @@ TEST_CASE("gradients") {
 
 TEST_CASE("base and threads do not matter, units do as they should") {
   Random random(4);
-  for (const auto& [name, arm] : test::arms()) {
+  for (const auto& [key, arm] : test::arms()) {
+    const std::string& name = key;
     const int n = arm.dof();
     std::vector<Segment> segments = arm.segments();
     segments.front().origin = random.pose() * segments.front().origin;

@@ -242,7 +242,8 @@ TEST_CASE("a URDF's shapes are covered whole, and not by much more") {
     const Vector3d disc(0.02 * std::cos(angle), 0.02 * std::sin(angle), 0.0);
     REQUIRE(covered(1, Vector3d(0.0, 0.0, 0.4) + turned(1.0, Vector3d::UnitX()) * (Vector3d(0.0, 0.1, 0.0) + disc)));
   }
-  for (const auto& [name, arm] : test::arms()) {
+  for (const auto& [key, arm] : test::arms()) {
+    const std::string& name = key;
     const ArmSpheres found = ArmSpheres::from_urdf(arm, std::string(SIGMAIK_ROBOTS_DIR) + "/" + name + ".urdf");
     CAPTURE(name);
     CHECK(found.size() >= 20);
@@ -252,7 +253,8 @@ TEST_CASE("a URDF's shapes are covered whole, and not by much more") {
 }
 
 TEST_CASE("along the links: no gap wider than the radius, from the base to the tip") {
-  for (const auto& [name, arm] : test::arms()) {
+  for (const auto& [key, arm] : test::arms()) {
+    const std::string& name = key;
     CAPTURE(name);
     const ArmSpheres spheres = ArmSpheres::along_links(arm, 0.04);
     SphereState state;
@@ -357,7 +359,8 @@ TEST_CASE("self-collision cost") {
   Random random(6);
   int touched = 0;
   std::size_t left_out = 0;
-  for (const auto& [name, arm] : test::arms()) {
+  for (const auto& [key, arm] : test::arms()) {
+    const std::string& name = key;
     CAPTURE(name);
     const ArmSpheres spheres = ArmSpheres::from_urdf(arm, std::string(SIGMAIK_ROBOTS_DIR) + "/" + name + ".urdf");
     const std::vector<SpherePair> pairs = self_collision_pairs(spheres);

@@ -107,7 +107,8 @@ void check_step(const Chain& chain, const ServoStep& step, const JointVector& be
 
 TEST_CASE("every arm reaches what it can reach") {
   REQUIRE(arms().size() == 9);
-  for (const auto& [name, chain] : arms()) {
+  for (const auto& [key, chain] : arms()) {
+    const std::string& name = key;
     Random random(1);
     for (int repeat = 0; repeat < 10; ++repeat) {
       CAPTURE(name);
@@ -144,7 +145,8 @@ TEST_CASE("every arm reaches what it can reach") {
 TEST_CASE("velocity limits: kept without tolerance, by scaling, and the joints named that asked for it") {
   Random random(2);
   int limited = 0;
-  for (const auto& [name, shipped] : arms()) {
+  for (const auto& [key, shipped] : arms()) {
+    const std::string& name = key;
     for (int repeat = 0; repeat < 20; ++repeat) {
       CAPTURE(name);
       JointLimits limits = shipped.limits();
@@ -191,7 +193,8 @@ TEST_CASE("velocity limits: kept without tolerance, by scaling, and the joints n
 
 TEST_CASE("one cycle, by the formula: gains, caps, posture and weights") {
   Random random(24);
-  for (const auto& [name, chain] : arms()) {
+  for (const auto& [key, chain] : arms()) {
+    const std::string& name = key;
     for (int repeat = 0; repeat < 40; ++repeat) {
       CAPTURE(name);
       ServoOptions options = free_options();
@@ -253,7 +256,8 @@ TEST_CASE("without limits nothing is held back") {
 
 TEST_CASE("reset: no kick towards one's own pose, posture pinned") {
   Random random(4);
-  for (const auto& [name, chain] : arms()) {
+  for (const auto& [key, chain] : arms()) {
+    const std::string& name = key;
     for (const Method& method : all_methods()) {
       CAPTURE(name);
       ServoOptions options;
@@ -276,7 +280,8 @@ TEST_CASE("reset: no kick towards one's own pose, posture pinned") {
 
 TEST_CASE("reset: everything before is forgotten") {
   Random random(5);
-  for (const auto& [name, chain] : arms()) {
+  for (const auto& [key, chain] : arms()) {
+    const std::string& name = key;
     CAPTURE(name);
     ServoOptions options;
     options.posture_gain = 1.0;
@@ -296,7 +301,8 @@ TEST_CASE("reset: everything before is forgotten") {
 
 TEST_CASE("soft start: a pose target's command grows from nothing, a twist's is there at once") {
   Random random(6);
-  for (const auto& [name, chain] : arms()) {
+  for (const auto& [key, chain] : arms()) {
+    const std::string& name = key;
     CAPTURE(name);
     ServoOptions soft = free_options(), hard = free_options();
     soft.soft_start = 0.1;
@@ -323,7 +329,8 @@ TEST_CASE("soft start: a pose target's command grows from nothing, a twist's is 
 
 TEST_CASE("reset with a velocity: the command starts from how the arm moves") {
   Random random(7);
-  for (const auto& [name, chain] : arms()) {
+  for (const auto& [key, chain] : arms()) {
+    const std::string& name = key;
     CAPTURE(name);
     const ServoOptions options = free_options();
     const JointVector start = regular_configuration(random, chain), moving = 0.3 * random.vector(chain.dof());
@@ -357,7 +364,8 @@ TEST_CASE("reset with a velocity: the command starts from how the arm moves") {
 
 TEST_CASE("what is not a pose or a twist is refused, and without limits leaves no trace") {
   Random random(8);
-  for (const auto& [name, chain] : arms()) {
+  for (const auto& [key, chain] : arms()) {
+    const std::string& name = key;
     CAPTURE(name);
     ServoOptions options = free_options();
     options.posture_gain = 1.0;
@@ -479,7 +487,8 @@ TEST_CASE("options out of their range are refused") {
 }
 
 TEST_CASE("targets that jump: always finite, always within the limits, and reached when they rest") {
-  for (const auto& [name, chain] : arms()) {
+  for (const auto& [key, chain] : arms()) {
+    const std::string& name = key;
     for (const Method& method : all_methods()) {
       Random random(10);
       CAPTURE(name);
@@ -505,7 +514,8 @@ TEST_CASE("targets that jump: always finite, always within the limits, and reach
 }
 
 TEST_CASE("out of reach for ten thousand cycles: stretched out, and still") {
-  for (const auto& [name, chain] : arms()) {
+  for (const auto& [key, chain] : arms()) {
+    const std::string& name = key;
     Random random(11);
     for (int repeat = 0; repeat < 2; ++repeat) {
       CAPTURE(name);
@@ -541,7 +551,8 @@ TEST_CASE("out of reach for ten thousand cycles: stretched out, and still") {
 
 TEST_CASE("a start at an exact singularity: what can move does, what cannot says so") {
   int feasible = 0, infeasible = 0;
-  for (const auto& [name, chain] : arms()) {
+  for (const auto& [key, chain] : arms()) {
+    const std::string& name = key;
     ChainState state;
     const JointVector zero = JointVector::Zero(chain.dof());
     update(chain, zero, state);
@@ -596,7 +607,8 @@ TEST_CASE("a start at an exact singularity: what can move does, what cannot says
 
 TEST_CASE("every rule, at every arm's zero pose: finite, within the limits, the same each time") {
   Random random(12);
-  for (const auto& [name, chain] : arms()) {
+  for (const auto& [key, chain] : arms()) {
+    const std::string& name = key;
     for (const Method& method : all_methods()) {
       CAPTURE(name);
       CAPTURE(sigmaik::name(method));
@@ -619,7 +631,8 @@ TEST_CASE("every rule, at every arm's zero pose: finite, within the limits, the 
 }
 
 TEST_CASE("twists are exact away from singularities") {
-  for (const auto& [name, chain] : arms()) {
+  for (const auto& [key, chain] : arms()) {
+    const std::string& name = key;
     Random random(13);
     for (int repeat = 0; repeat < 20; ++repeat) {
       CAPTURE(name);
@@ -708,7 +721,8 @@ TEST_CASE("the posture: moves the joints, not the tip; capped per joint; continu
 }
 
 TEST_CASE("position only: the position is reached, the orientation is free") {
-  for (const auto& [name, chain] : arms()) {
+  for (const auto& [key, chain] : arms()) {
+    const std::string& name = key;
     Random random(16);
     for (int repeat = 0; repeat < 5; ++repeat) {
       CAPTURE(name);
@@ -771,7 +785,8 @@ TEST_CASE("with equal gains J-PARSE never increases the error, orientation inclu
 }
 
 TEST_CASE("the error shrinks cycle by cycle") {
-  for (const auto& [name, chain] : arms()) {
+  for (const auto& [key, chain] : arms()) {
+    const std::string& name = key;
     Random random(18);
     for (int repeat = 0; repeat < 5; ++repeat) {
       CAPTURE(name);
@@ -792,7 +807,8 @@ TEST_CASE("the error shrinks cycle by cycle") {
 }
 
 TEST_CASE("half a turn away: it turns, and arrives") {
-  for (const auto& [name, chain] : arms()) {
+  for (const auto& [key, chain] : arms()) {
+    const std::string& name = key;
     if (name == "puma560") continue;  // its wrist's limits do not matter here, but its wrist is singular on the way
     Random random(19);
     CAPTURE(name);
@@ -813,7 +829,8 @@ TEST_CASE("half a turn away: it turns, and arrives") {
 
 TEST_CASE("targets and twists beyond all measure") {
   Random random(20);
-  for (const auto& [name, chain] : arms()) {
+  for (const auto& [key, chain] : arms()) {
+    const std::string& name = key;
     for (const Method& method : all_methods()) {
       for (const bool limits : {true, false}) {
         CAPTURE(name);
@@ -886,7 +903,8 @@ TEST_CASE("the rule may be changed on the way; a copy goes on by itself") {
 
 TEST_CASE("an arm of another size under the same servo moves the same") {
   Random random(22);
-  for (const auto& [name, chain] : arms()) {
+  for (const auto& [key, chain] : arms()) {
+    const std::string& name = key;
     for (const double size : {0.1, 10.0, 1000.0}) {
       CAPTURE(name);
       std::vector<Segment> segments = chain.segments();
@@ -912,7 +930,8 @@ TEST_CASE("an arm of another size under the same servo moves the same") {
 TEST_CASE("feed-forward: behind a moving target the error is of the order of dt, not speed/gain") {
   // A target T(t) = exp(t ω) about a place that drifts, fed forward: e' = −g e + O(dt) in the loop, so e → O(dt).
   Random random(31);
-  for (const auto& [name, chain] : arms()) {
+  for (const auto& [key, chain] : arms()) {
+    const std::string& name = key;
     CAPTURE(name);
     if (chain.dof() < 6) continue;
     const JointVector start = regular_configuration(random, chain, 0.1);
@@ -949,7 +968,8 @@ TEST_CASE("feed-forward: behind a moving target the error is of the order of dt,
 TEST_CASE(
     "feed-forward: zero is none, it is added after the caps, limits are held, and what is not finite is refused") {
   Random random(32);
-  for (const auto& [name, chain] : arms()) {
+  for (const auto& [key, chain] : arms()) {
+    const std::string& name = key;
     CAPTURE(name);
     const JointVector start = regular_configuration(random, chain);
     Pose far = pose(chain, start);

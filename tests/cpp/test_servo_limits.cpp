@@ -108,7 +108,8 @@ VectorXd rule(const Chain& chain, const Method& method, const JointVector& q, co
 
 TEST_CASE("while no limit is met the answer is the rule's, to the last digit") {
   long same = 0, other = 0;
-  for (const auto& [name, shipped] : arms()) {
+  for (const auto& [key, shipped] : arms()) {
+    const std::string& name = key;
     const Chain chain = complete(shipped, 500.0);
     for (const Method& method : some_methods()) {
       for (const OnLimit on_limit : {OnLimit::Redistribute, OnLimit::Scale}) {
@@ -144,7 +145,8 @@ TEST_CASE("while no limit is met the answer is the rule's, to the last digit") {
 TEST_CASE("redistribution: the bounded least squares that it says, by its optimality conditions") {
   Random random(2);
   int cases = 0, several = 0;
-  for (const auto& [name, shipped] : arms()) {
+  for (const auto& [key, shipped] : arms()) {
+    const std::string& name = key;
     for (int repeat = 0; repeat < 60; ++repeat) {
       CAPTURE(name);
       CAPTURE(repeat);
@@ -198,7 +200,8 @@ TEST_CASE("redistribution: the bounded least squares that it says, by its optima
 TEST_CASE("redundant arms: the other joints take over all of it where they can") {
   Random random(3);
   int cases = 0, took_over = 0;
-  for (const auto& [name, shipped] : arms()) {
+  for (const auto& [key, shipped] : arms()) {
+    const std::string& name = key;
     if (shipped.dof() != 7) continue;
     for (int repeat = 0; repeat < 60; ++repeat) {
       const JointVector q = regular(random, shipped, 0.1);
@@ -242,7 +245,8 @@ TEST_CASE("redundant arms: the other joints take over all of it where they can")
 TEST_CASE("exact rows are kept while the others give way, in base and in tool axes") {
   Random random(4);
   int cases = 0, gave_way = 0, first_lost = 0;
-  for (const auto& [name, shipped] : arms()) {
+  for (const auto& [key, shipped] : arms()) {
+    const std::string& name = key;
     const int n = shipped.dof();
     for (int repeat = 0; repeat < 80; ++repeat) {
       CAPTURE(name);
@@ -289,7 +293,8 @@ TEST_CASE("exact rows are kept while the others give way, in base and in tool ax
 
 TEST_CASE("scaling keeps the direction, and gets there in proportion, whenever the limits allow") {
   long straight = 0, bent = 0;
-  for (const auto& [name, shipped] : arms()) {
+  for (const auto& [key, shipped] : arms()) {
+    const std::string& name = key;
     for (const bool accelerations : {false, true}) {
       Random random(5);
       CAPTURE(name);
@@ -345,7 +350,8 @@ TEST_CASE("scaling keeps the direction, and gets there in proportion, whenever t
 
 TEST_CASE("without acceleration limits the answer does not depend on the cycles before it") {
   int limited = 0;
-  for (const auto& [name, shipped] : arms()) {
+  for (const auto& [key, shipped] : arms()) {
+    const std::string& name = key;
     for (const OnLimit on_limit : {OnLimit::Redistribute, OnLimit::Scale}) {
       Random random(12);
       CAPTURE(name);
@@ -371,7 +377,8 @@ TEST_CASE("without acceleration limits the answer does not depend on the cycles 
 
 TEST_CASE("leaving a limit is never held back, from any corner of the limits") {
   int whole = 0, corners = 0;
-  for (const auto& [name, shipped] : arms()) {
+  for (const auto& [key, shipped] : arms()) {
+    const std::string& name = key;
     Random random(6);
     const Chain chain = complete(shipped);
     const int n = chain.dof();
@@ -421,7 +428,8 @@ TEST_CASE("leaving a limit is never held back, from any corner of the limits") {
 }
 
 TEST_CASE("starts outside the limits, and too fast ones: every arm comes back, and stays") {
-  for (const auto& [name, shipped] : arms()) {
+  for (const auto& [key, shipped] : arms()) {
+    const std::string& name = key;
     for (const double jerk : {kInfinity, 300.0}) {
       for (int kind = 0; kind < 6; ++kind) {
         Random random(7);
@@ -480,7 +488,8 @@ TEST_CASE("starts outside the limits, and too fast ones: every arm comes back, a
 
 TEST_CASE("a start at all zeros: each of twelve directions moves, or says why not") {
   int moved = 0, said = 0;
-  for (const auto& [name, shipped] : arms()) {
+  for (const auto& [key, shipped] : arms()) {
+    const std::string& name = key;
     const Chain chain = complete(shipped);
     for (const OnLimit on_limit : {OnLimit::Redistribute, OnLimit::Scale}) {
       for (int direction = 0; direction < 12; ++direction) {
@@ -513,7 +522,8 @@ TEST_CASE("a start at all zeros: each of twelve directions moves, or says why no
 }
 
 TEST_CASE("bad input in motion: a stop as fast as the limits allow, and on again afterwards") {
-  for (const auto& [name, shipped] : arms()) {
+  for (const auto& [key, shipped] : arms()) {
+    const std::string& name = key;
     for (const double jerk : {kInfinity, 100.0}) {
       for (const bool as_pose : {false, true}) {
         Random random(9);
@@ -587,7 +597,8 @@ TEST_CASE("no jumps where the joints held change: as commands move, and as the a
   constexpr int kSteps = 300;
   double by_command = 0.0, over_rule = 0.0, by_state = 0.0, tool_by_state = 0.0, jump = 0.0;
   long switches = 0, steps = 0, swings = 0;
-  for (const auto& [name, shipped] : arms()) {
+  for (const auto& [key, shipped] : arms()) {
+    const std::string& name = key;
     Random random(10);
     for (int repeat = 0; repeat < 40; ++repeat) {
       CAPTURE(name);
@@ -664,7 +675,8 @@ TEST_CASE("no jumps where the joints held change: as commands move, and as the a
 #ifdef SIGMAIK_TEST_HEAP
 TEST_CASE("no heap with limits active, in the servo and in constrained inverse kinematics") {
   Random random(11);
-  for (const auto& [name, shipped] : arms()) {
+  for (const auto& [key, shipped] : arms()) {
+    const std::string& name = key;
     const Chain chain = complete(shipped, 1000.0);
     for (const OnLimit on_limit : {OnLimit::Redistribute, OnLimit::Scale}) {
       for (const Frame frame : {Frame::Base, Frame::Tool}) {

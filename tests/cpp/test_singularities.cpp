@@ -220,7 +220,8 @@ TEST_CASE("on a set: no force, the potential's full height, and a hill that bend
 
 TEST_CASE("arms are recognised by their axes") {
   Random random(5);
-  for (const auto& [name, arm] : test::arms()) {
+  for (const auto& [key, arm] : test::arms()) {
+    const std::string& name = key;
     CAPTURE(name);
     const std::optional<SingularSets> found = SingularSets::of(arm);
     const std::vector<std::string> names = SingularSets::names();

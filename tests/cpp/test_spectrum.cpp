@@ -243,7 +243,8 @@ TEST_CASE("a million cycles leave U and V orthogonal") {
   struct Run {
     int m, n, steps;
   };
-  for (const auto [m, n, steps] : {Run{6, 7, 1000000}, Run{3, 9, 100000}, Run{6, 4, 100000}, Run{6, 6, 100000}}) {
+  for (const Run& run : {Run{6, 7, 1000000}, Run{3, 9, 100000}, Run{6, 4, 100000}, Run{6, 6, 100000}}) {
+    const int m = run.m, n = run.n, steps = run.steps;
     CAPTURE(m);
     CAPTURE(n);
     const MatrixXd a = random.matrix(m, n), b = random.matrix(m, n), c = random.matrix(m, n);
@@ -328,7 +329,8 @@ TEST_CASE("directions of zero singular values move no more than the matrix") {
   struct Size {
     int m, n;
   };
-  for (const auto [m, n] : {Size{6, 7}, Size{6, 6}, Size{3, 3}, Size{6, 3}, Size{4, 12}, Size{6, 16}}) {
+  for (const Size& size : {Size{6, 7}, Size{6, 6}, Size{3, 3}, Size{6, 3}, Size{4, 12}, Size{6, 16}}) {
+    const int m = size.m, n = size.n;
     for (int rank = 0; rank < std::min(m, n); ++rank) {
       CAPTURE(m);
       CAPTURE(n);

@@ -96,11 +96,9 @@ TEST_CASE("a solver with a task: as masked by hand, and as given masked already"
 
     // Weighted by hand, the rows need neither task nor length scale.
     int row = 0;
-    std::uint8_t angular = 0;
     for (int i = 0; i < 6; ++i) {
       if (!task.mask[static_cast<std::size_t>(i)]) continue;
       if (i >= 3) {
-        angular |= static_cast<std::uint8_t>(1u << row);
         masked.row(row) *= length_scale;
         command[row] *= length_scale;
       }

@@ -229,7 +229,8 @@ TEST_CASE("without limits and costs the optimum has a closed form") {
 TEST_CASE("constraints hold, the objective is what is said, and the motion is stationary") {
   Random random(2);
   int optimal = 0, moving = 0;
-  for (const auto& [name, arm] : test::arms()) {
+  for (const auto& [key, arm] : test::arms()) {
+    const std::string& name = key;
     const Chain chain = with_accelerations(arm, 10.0);
     const int n = chain.dof();
     for (int trial = 0; trial < 12; ++trial) {
