@@ -13,6 +13,8 @@ sed -zEi '
   s/(\n    [A-Z_]+ = \.\.\.\n)((    @\w+\n)*    def [^\n]*\n(        [^\n]*\n)+)+/\1/g
   s/\n__version__: str = [^\n]*/\n__version__: str/
   s/ +\n/\n/g' "$out/sigmaik/_core.pyi"
+# Both files in sections by topic: the order in which branches were merged makes no difference.
+.venv/bin/python tools/stub_sections.py "$out/sigmaik/_core.pyi" python/sigmaik/_core.pyi
 
 if [[ ${1:-} == --check ]]; then
   if ! diff -u python/sigmaik/_core.pyi "$out/sigmaik/_core.pyi"; then

@@ -1,6 +1,8 @@
 """The checks of `make lint` find what they are for."""
 
+import ast
 import pathlib
+import re
 import shutil
 import subprocess
 import sys
@@ -90,3 +92,30 @@ def test_what_is_untrue_in_workflows_and_hooks_is_found(repository, file, old, n
     assert old in text
     (repository / file).write_text(text.replace(old, new), encoding="utf-8")
     assert finding in check("check_ci.py", repository)
+
+
+def test_a_stub_is_grouped_by_the_topics_of_the_bindings(tmp_path):
+    stub = tmp_path / "_core.pyi"
+    shutil.copy(ROOT / "python" / "sigmaik" / "_core.pyi", stub)
+    before = stub.read_text(encoding="utf-8")
+
+    def group():
+        subprocess.run([sys.executable, ROOT / "tools" / "stub_sections.py", stub], check=True)
+        return stub.read_text(encoding="utf-8")
+
+    once = group()
+    assert group() == once
+
+    def content(text):
+        return sorted(line for line in text.splitlines() if line and not line.startswith("# ----"))
+
+    assert content(once) == content(before)
+    ast.parse(once)
+    sections = [section.split(" ---", 1) for section in once.split("# ---- ")[1:]]
+    found = {
+        name: title for title, text in sections for name in re.findall(r"^(?:class|def) (\w+)", text, re.MULTILINE)
+    }
+    assert found["Chain"] == found["Inertia"] == "Chain"
+    assert found["JParse"] == found["PseudoInverse"] == "Methods"
+    assert found["solve_batch"] == found["VelocitySolver"] == "Solver"
+    assert "Other" not in found.values()
