@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import re
 from pathlib import Path
 
@@ -39,7 +40,6 @@ breathe_projects = {"sigmaik": str(ROOT / "build/docs/doxygen/xml")}
 breathe_default_project = "sigmaik"
 breathe_show_include = False
 cpp_maximum_signature_line_length = 100
-suppress_warnings = ["duplicate_declaration.cpp"]  # `namespace sigmaik`, which every header opens
 
 html_theme = "furo"
 html_title = f"sigmaik {version}"
@@ -81,6 +81,15 @@ def _signature(app, what, name, obj, options, signature: str | None, returned: s
         signature = re.sub(r"\(self: [\w.]+(, )?", "(", signature)
         signature = signature.replace("numpy.typing.", "")
     return signature, returned
+
+
+def _says_more(record: logging.LogRecord) -> bool:
+    """False for the duplicates that are none: a namespace, which every header opens again."""
+    return not re.search(r"Duplicate C\+\+ declaration.*cpp:type:: (sigmaik|planning)'", record.getMessage(), re.DOTALL)
+
+
+for _logger in ("sphinx.sphinx.domains.cpp", "sphinx.sphinx.domains.cpp._symbol"):
+    logging.getLogger(_logger).addFilter(_says_more)
 
 
 class Headers(SphinxDirective):
