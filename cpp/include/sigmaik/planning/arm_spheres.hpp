@@ -51,9 +51,13 @@ class ArmSpheres {
   /// \throws Error where the radius is not positive, or so small that there would be too many spheres
   static ArmSpheres along_links(const Chain& chain, double radius = 0.05);
 
+  /// Number of spheres.
   int size() const noexcept { return static_cast<int>(spheres_.size()); }
+  /// The arm.
   const Chain& chain() const noexcept { return chain_; }
+  /// The spheres, base to tip.
   const std::vector<LinkSphere>& spheres() const noexcept { return spheres_; }
+  /// Radius of sphere i [m].
   double radius(int i) const noexcept { return spheres_[static_cast<std::size_t>(i)].radius; }
   /// How many joints move sphere i, 0 … n: the first ones.
   int joints(int i) const noexcept { return joints_[static_cast<std::size_t>(i)]; }

@@ -34,8 +34,11 @@ class DistanceField {
   /// \throws Error where a number is out of its range or sizes do not fit
   DistanceField(const std::vector<double>& distances, const Shape& shape, const Eigen::Vector3d& origin, double cell);
 
+  /// Number of nodes along x, y, z.
   const Shape& shape() const noexcept { return shape_; }
+  /// Position of the first node [m], (3,).
   const Eigen::Vector3d& origin() const noexcept { return origin_; }
+  /// Distance between neighbouring nodes [m].
   double cell() const noexcept { return cell_; }
 
   /// At a point [m]. Real time.
