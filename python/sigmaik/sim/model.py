@@ -1,0 +1,150 @@
+"""The MuJoCo model of a chain."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sigmaik import _core
+from sigmaik._types import Array
+
+__all__ = ["build"]
+
+
+def build(
+    chain: _core.Chain,
+    gain: Array | None,
+    effort: Array,
+    stops: bool,
+    joints: dict[str, Array],
+    payload: _core.Inertia | None,
+    gravity: ArrayLike,
+    timestep: float,
+) -> Any:
+    """A mujoco.MjModel: a body for each movable joint with all links that move with the joint, and one for the payload.
+
+    gain: (n,) K_v of the velocity loops [N·m·s/rad]; None: the drives are torque motors
+    effort: (n,) limits of the drives [N·m or N]
+    stops: whether the position limits are stops
+    joints: viscous_friction, coulomb_friction and armature, (n,) each
+    gravity: (3,) [m/s²] in base axes
+    timestep: [s]
+    """
+    import mujoco  # type: ignore[import-untyped]
+
+    spec = mujoco.MjSpec()
+    spec.option.gravity = np.asarray(gravity, dtype=np.float64)
+    spec.option.timestep = timestep
+    # The integrator is implicit in the friction, and in the velocity loops while their torque is below the limit.
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    spec.option.disableflags = mujoco.mjtDisableBit.mjDSBL_AUTORESET | mujoco.mjtDisableBit.mjDSBL_CONTACT
+
+    body, place, joint = spec.worldbody, np.eye(4), 0
+    inertias: list[list[tuple[_core.Inertia, Array]]] = []
+    limits = chain.limits
+    for segment in chain.segments:
+        place = place @ segment.origin
+        if segment.type != "fixed":
+            body = _add_body(body, segment.link_name, place)
+            span = (limits.lower[joint], limits.upper[joint]) if stops else (-math.inf, math.inf)
+            _add_joint(body, segment, span, {name: values[joint] for name, values in joints.items()})
+            _add_drive(spec, segment.joint_name, None if gain is None else gain[joint], effort[joint])
+            inertias.append([])
+            place, joint = np.eye(4), joint + 1
+        if inertias and segment.inertia is not None:
+            inertias[-1].append((segment.inertia, place))
+    body.add_site(name="tip", pos=place[:3, 3], quat=_quaternion(place[:3, :3]))
+    if payload is not None and payload.mass > 0.0:
+        _add_body(body, "payload", place)
+        inertias.append([(payload, np.eye(4))])
+    model = spec.compile()
+
+    # MuJoCo's solver accepts inertias that no rigid body can have, such as the published ones of the PUMA, but MuJoCo's
+    # compiler refuses them. The bodies are therefore compiled with other inertias, which are replaced here.
+    for number, parts in enumerate(inertias, start=1):
+        mass, centre, tensor = _together(parts)
+        moments, axes = np.linalg.eigh(tensor)
+        axes[:, 2] *= np.linalg.det(axes)
+        model.body_mass[number] = mass
+        model.body_ipos[number] = centre
+        model.body_iquat[number] = _quaternion(axes)
+        model.body_inertia[number] = moments
+    mujoco.mj_setConst(model, mujoco.MjData(model))
+    return model
+
+
+def _add_joint(body: Any, segment: _core.Segment, span: tuple[float, float], friction: dict[str, float]) -> None:
+    import mujoco
+
+    kind = mujoco.mjtJoint.mjJNT_SLIDE if segment.type == "prismatic" else mujoco.mjtJoint.mjJNT_HINGE
+    options: dict[str, Any] = {}
+    lower, upper = span
+    if math.isfinite(lower) or math.isfinite(upper):
+        # A range needs two ends; the end that does not exist is far away.
+        options = {"limited": True, "range": [max(lower, -1e6), min(upper, 1e6)]}
+    body.add_joint(
+        name=segment.joint_name,
+        type=kind,
+        axis=segment.axis,
+        damping=friction["viscous_friction"],
+        frictionloss=friction["coulomb_friction"],
+        armature=friction["armature"],
+        **options,
+    )
+
+
+def _add_drive(spec: Any, joint: str, gain: float | None, effort: float) -> None:
+    """A motor; with a gain K_v, a velocity loop: torque K_v (command − q̇). `effort` limits the torque."""
+    import mujoco
+
+    actuator = spec.add_actuator(name=joint, target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+    if gain is not None:
+        actuator.gainprm[0] = gain
+        actuator.biastype = mujoco.mjtBias.mjBIAS_AFFINE
+        actuator.biasprm[2] = -gain
+    if math.isfinite(effort):
+        actuator.forcelimited = True
+        actuator.forcerange = [-effort, effort]
+
+
+def _add_body(parent: Any, name: str, place: Array) -> Any:
+    # The inertia has a frame of its own and no principal axes. With simpler values MuJoCo would take short cuts that
+    # are wrong for the true inertia, which is set later.
+    return parent.add_body(
+        name=name,
+        pos=place[:3, 3],
+        quat=_quaternion(place[:3, :3]),
+        mass=1.0,
+        ipos=[0.1, 0.2, 0.3],
+        fullinertia=[1.0, 1.1, 1.2, 0.1, 0.1, 0.1],
+        explicitinertial=True,
+    )
+
+
+def _quaternion(rotation: Array) -> Array:
+    """The quaternion wxyz of a rotation, in the order of MuJoCo."""
+    import mujoco
+
+    wxyz = np.empty(4)
+    mujoco.mju_mat2Quat(wxyz, np.ascontiguousarray(rotation).reshape(9))
+    return wxyz
+
+
+def _together(parts: Sequence[tuple[_core.Inertia, Array]]) -> tuple[float, Array, Array]:
+    """Mass, centre and tensor about it, of inertias in frames (4, 4), in the frame of these. Steiner: m (r·r I − r
+    rᵀ)."""
+    mass = sum(inertia.mass for inertia, _ in parts)
+    centres = [frame[:3, :3] @ inertia.center_of_mass + frame[:3, 3] for inertia, frame in parts]
+    centre = np.zeros(3)
+    if mass > 0.0:
+        centre = sum((i.mass * c for (i, _), c in zip(parts, centres, strict=True)), np.zeros(3)) / mass
+    tensor = np.zeros((3, 3))
+    for (inertia, frame), c in zip(parts, centres, strict=True):
+        r = c - centre
+        tensor += frame[:3, :3] @ inertia.tensor @ frame[:3, :3].T
+        tensor += inertia.mass * (r @ r * np.eye(3) - np.outer(r, r))
+    return mass, centre, tensor
