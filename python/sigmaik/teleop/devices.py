@@ -1,4 +1,4 @@
-"""Gamepads and SpaceMice as twists (extra `devices`). A device that is not there is said, not guessed.
+"""Gamepads and SpaceMice as twists (extra `devices`). A missing device is an error.
 
 Both move only while a button is held (the dead man's switch): the left shoulder button of a gamepad, the left button
 of a SpaceMouse. They are plugged into the machine that runs the servo.
@@ -17,34 +17,34 @@ from sigmaik._types import Array
 
 __all__ = ["DEVICES", "DeviceError", "Gamepad", "Reading", "SpaceMouse", "TwistDevice", "open_device"]
 
-DEAD_ZONE = 0.12  #: of a stick's travel, in which it counts as let go
+DEAD_ZONE = 0.12  #: part of a stick's travel in which the stick counts as released
 
 
 class DeviceError(ValueError):
-    """A device is not there, or no longer."""
+    """A device is missing, or has been unplugged."""
 
 
 @dataclass(frozen=True)
 class Reading:
-    """What a device says now."""
+    """One reading of a device."""
 
     twist: Array  #: (6,) [v; ω], each in [−1, 1], base axes: x ahead, y to the left, z up
     held: bool  #: whether the dead man's switch is held
 
 
 class TwistDevice(Protocol):
-    """What drives an arm by twists."""
+    """A device that drives an arm by twists."""
 
     name: str
 
     def read(self) -> Reading:
-        """What it says now. DeviceError where it is gone."""
+        """The current reading. DeviceError if the device has been unplugged."""
 
     def close(self) -> None: ...
 
 
 class Gamepad:
-    """The first gamepad that SDL finds. Left stick: x and y; right stick: turn about z, and z; triggers: none."""
+    """The first gamepad that SDL finds. The left stick moves along x and y, the right stick along z and about z."""
 
     def __init__(self) -> None:
         need("pygame")
@@ -87,7 +87,7 @@ class SpaceMouse:
 
         try:
             self._mouse = pyspacemouse.open()
-        except Exception as error:  # the library's own, of several kinds, and those of its HID layer
+        except Exception as error:  # pyspacemouse and its HID layer raise errors of several types
             raise DeviceError(f"no SpaceMouse can be opened: {' '.join(str(error).split())}") from None
         if self._mouse is None:
             raise DeviceError("no SpaceMouse is plugged in")
@@ -98,7 +98,7 @@ class SpaceMouse:
             state: Any = self._mouse.read()
         except Exception as error:
             raise DeviceError(f"{self.name} is gone: {' '.join(str(error).split())}") from None
-        # Its y is ahead and its x to the right; roll is about y, pitch about x.
+        # y of a SpaceMouse points ahead and x to the right; roll is about y, pitch about x.
         twist = np.array([state.y, -state.x, state.z, -state.roll, -state.pitch, -state.yaw])
         return Reading(np.clip(np.nan_to_num(twist), -1.0, 1.0), bool(state.buttons and state.buttons[0]))
 
@@ -106,18 +106,18 @@ class SpaceMouse:
         self._mouse.close()
 
 
-#: Name to class, of what `open_device` opens.
+#: The class of each name that `open_device` knows.
 DEVICES: dict[str, type[Gamepad] | type[SpaceMouse]] = {"gamepad": Gamepad, "spacemouse": SpaceMouse}
 
 
 def open_device(name: str) -> TwistDevice:
-    """A device by name. ValueError where there is no such name; DeviceError, one too, where it is not there."""
+    """Opens a device by name. ValueError for an unknown name; DeviceError, a ValueError too, for a missing device."""
     if name not in DEVICES:
         raise ValueError(f"there is no device '{name}'; there are {', '.join(DEVICES)}")
     return DEVICES[name]()
 
 
 def _outside_dead_zone(value: float) -> float:
-    """From 0 at the dead zone's edge to ±1."""
+    """The deflection of a stick, scaled from 0 at the edge of the dead zone to ±1."""
     size = (min(abs(value), 1.0) - DEAD_ZONE) / (1.0 - DEAD_ZONE)
     return float(np.copysign(size, value)) if size > 0.0 else 0.0

@@ -1,4 +1,4 @@
-"""An arm as a URDF that can be drawn: its own visuals where the meshes are found, else simple shapes."""
+"""An arm as a URDF that can be drawn, with simple shapes for the links whose meshes are missing."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class RobotView:
         handler = functools.partial(yourdfpy.filename_handler_magic, dir=source.parent)
         text, self.missing = drawable(source.read_text(encoding="utf-8"), handler)
         urdf = yourdfpy.URDF.load(io.BytesIO(text.encode()), filename_handler=handler, load_collision_meshes=False)
-        # The scene's axes are the chain's base's, which need not be the URDF's root.
+        # The axes of the scene are those of the chain's base, which can differ from the root of the URDF.
         root = np.linalg.inv(np.asarray(urdf.get_transform(chain.base)))
         server.scene.add_frame(
             name, show_axes=False, position=root[:3, 3], wxyz=transforms.SO3.from_matrix(root[:3, :3]).wxyz
@@ -42,7 +42,7 @@ class RobotView:
         self._shown: Array | None = None
 
     def show(self, q: Array) -> None:
-        """Draws the arm at q (n,); joints that are not the chain's stay at 0."""
+        """Draws the arm at q (n,); all joints outside the chain stay at 0."""
         if self._shown is not None and np.array_equal(q, self._shown):
             return
         self._shown = q.copy()

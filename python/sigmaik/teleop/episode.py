@@ -50,7 +50,7 @@ class Arm:
 
     name: str
     urdf: str  #: text
-    chain: sk.Chain  #: with the limits that were held
+    chain: sk.Chain  #: with the limits that the servo kept
     home: Array  #: (n,) the posture [rad or m]
 
 
@@ -79,7 +79,7 @@ class Episode:
 
     @property
     def runs(self) -> list[slice]:
-        """Spans in which no cycle is missing and the arm was not put elsewhere."""
+        """Spans without a missing cycle and without a restart of the arm at another place."""
         cuts = np.flatnonzero((np.diff(self["cycle"]) != 1) | self["restarted"][1:]) + 1
         edges = [0, *cuts.tolist(), len(self)]
         return [slice(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True)]
@@ -98,7 +98,7 @@ class Episode:
         for run in self.runs:
             change = np.abs(np.diff(qdot[run], axis=0)) / self.dt
             hard = change > limits.acceleration * (1.0 + 1e-6)
-            # A servo whose limits were just switched on may have come from anywhere.
+            # The velocity before the limits were switched on is not bounded by them.
             count["acceleration"] += int(hard[on[run][1:] & on[run][:-1]].sum())
         return count
 
