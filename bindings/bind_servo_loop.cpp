@@ -161,8 +161,8 @@ void bind_servo_loop(py::module_& m) {
       .def("hold", &ServoLoop::hold, "Stops as fast as limits allow, and rests.")
       .def("configure", &ServoLoop::configure, py::arg("servo"), py::arg("restart") = false,
            "Goes on with another servo (a copy) of the same arm and dt: other rule, other options.\n\n"
-           "The new servo takes over the motion. With `restart` it starts where it was reset to, in simulation only: a real\n"
-           "arm would jump.\n"
+           "The new servo takes over the motion. With `restart` it starts where it was reset to, in simulation only:\n"
+           "a real arm would jump.\n"
            "Returns a number, one more each time, by which samples tell it; 0 is the first servo's.")
       .def("read", &read,
            "(N,) structured array: what was done in each cycle since the last call.\n\n"

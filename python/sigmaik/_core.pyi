@@ -781,8 +781,8 @@ class ServoLoop:
         """
         Goes on with another servo (a copy) of the same arm and dt: other rule, other options.
 
-        The new servo takes over the motion. With `restart` it starts where it was reset to, in simulation only: a real
-        arm would jump.
+        The new servo takes over the motion. With `restart` it starts where it was reset to, in simulation only:
+        a real arm would jump.
         Returns a number, one more each time, by which samples tell it; 0 is the first servo's.
         """
     def follow(self, target: typing.Any, timeout: typing.SupportsFloat | typing.SupportsIndex) -> None:
