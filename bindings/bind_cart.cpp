@@ -126,7 +126,7 @@ void bind_cart(py::module_& m) {
   m.def(
       "forbidden_intervals",
       [](const ArrayLike& flange_xy, double radius) -> Vectors {
-        Eigen::VectorXd lower, upper;
+        planning::VectorXd lower, upper;
         planning::forbidden_intervals(path_argument(flange_xy), radius, lower, upper);
         return py::make_tuple(to_numpy(lower), to_numpy(upper));
       },
@@ -135,7 +135,7 @@ void bind_cart(py::module_& m) {
       "taut_string",
       [](const ArrayLike& at, const ArrayLike& lower,
          const ArrayLike& upper) -> py::typing::Tuple<py::array_t<double>, py::typing::List<py::int_>> {
-        Eigen::VectorXd x;
+        planning::VectorXd x;
         std::vector<int> corners;
         planning::taut_string(bounds_argument(at, "at"), bounds_argument(lower, "lower"),
                               bounds_argument(upper, "upper"), x, corners);
@@ -148,7 +148,7 @@ void bind_cart(py::module_& m) {
       [](const ArrayLike& lower, const ArrayLike& upper, const ArrayLike& guess, double alpha, double step,
          int max_iterations, bool until_admissible) -> py::typing::Tuple<py::array_t<double>, py::int_> {
         const Eigen::VectorXd low = bounds_argument(lower, "lower"), high = bounds_argument(upper, "upper");
-        Eigen::VectorXd x = bounds_argument(guess, "guess");
+        planning::VectorXd x = bounds_argument(guess, "guess");
         int iterations = 0;
         {
           py::gil_scoped_release release;

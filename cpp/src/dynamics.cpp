@@ -15,12 +15,18 @@
 namespace sigmaik {
 namespace {
 
-KDL::JntArray joints(const Eigen::VectorXd& values, int n, const char* what) {
+// KDL's arrays belong to the Eigen that KDL's library was compiled with: their storage may be less aligned than the
+// options of this file promise (-mavx), and padded otherwise (AddressSanitizer). So KDL's library allocates and frees
+// them, and they are read and written through maps that assume no alignment.
+Eigen::Map<Eigen::VectorXd> entries(KDL::JntArray& array) { return {array.data.data(), array.data.size()}; }
+Eigen::Map<Eigen::MatrixXd> entries(KDL::JntSpaceInertiaMatrix& matrix) {
+  return {matrix.data.data(), matrix.data.rows(), matrix.data.cols()};
+}
+
+KDL::JntArray joints(const JointRef& values, int n, const char* what) {
   detail::require(values.size() == n, what, " has ", values.size(), " entries, the chain ", n, " joints");
-  // KDL's library frees a JntArray's storage, so KDL's library must allocate it, too: the two Eigens may pad storage
-  // differently, as AddressSanitizer or -mavx makes them do. An assignment of the same size allocates nothing.
   KDL::JntArray array(static_cast<unsigned>(n));
-  array.data = values;
+  entries(array) = values;
   return array;
 }
 
@@ -76,9 +82,9 @@ struct Dynamics::Model {
   }
 
   // Torques for the members q, qdot and qddot.
-  const Eigen::VectorXd& recurse() {
+  Eigen::Map<Eigen::VectorXd> recurse() {
     recursion.CartToJnt(q, qdot, qddot, no_wrenches, torque);
-    return torque.data;
+    return entries(torque);
   }
 };
 
@@ -109,20 +115,20 @@ int Dynamics::dof() const noexcept { return model_->dof; }
 
 void Dynamics::evaluate(const JointRef& q, const JointRef& qdot, DynamicsTerms& terms) noexcept {
   Model& m = *model_;
-  m.q.data = q;
-  m.qdot.data = qdot;
+  entries(m.q) = q;
+  entries(m.qdot) = qdot;
   m.solver.JntToMass(m.q, m.mass);
-  terms.mass = m.mass.data;
-  m.qddot.data.setZero();
+  terms.mass = entries(m.mass);
+  entries(m.qddot).setZero();
   terms.bias = m.recurse();
 }
 
 void Dynamics::inverse_dynamics(const JointRef& q, const JointRef& qdot, const JointRef& qddot,
                                 JointVector& torque) noexcept {
   Model& m = *model_;
-  m.q.data = q;
-  m.qdot.data = qdot;
-  m.qddot.data = qddot;
+  entries(m.q) = q;
+  entries(m.qdot) = qdot;
+  entries(m.qddot) = qddot;
   torque = m.recurse();
 }
 
@@ -137,22 +143,22 @@ bool Dynamics::forward_dynamics(const JointRef& q, const JointRef& qdot, const J
   return definite;
 }
 
-Eigen::MatrixXd Dynamics::mass_matrix(const Eigen::VectorXd& q) const {
+JointMatrix Dynamics::mass_matrix(const JointRef& q) const {
   KDL::JntSpaceInertiaMatrix mass(model_->size());
   model_->solver.JntToMass(joints(q, model_->dof, "q"), mass);
-  return mass.data;
+  return entries(mass);
 }
 
-Eigen::VectorXd Dynamics::coriolis(const Eigen::VectorXd& q, const Eigen::VectorXd& qdot) const {
+JointVector Dynamics::coriolis(const JointRef& q, const JointRef& qdot) const {
   KDL::JntArray torque(model_->size());
   model_->solver.JntToCoriolis(joints(q, model_->dof, "q"), joints(qdot, model_->dof, "qdot"), torque);
-  return torque.data;
+  return entries(torque);
 }
 
-Eigen::VectorXd Dynamics::gravity(const Eigen::VectorXd& q) const {
+JointVector Dynamics::gravity(const JointRef& q) const {
   KDL::JntArray torque(model_->size());
   model_->solver.JntToGravity(joints(q, model_->dof, "q"), torque);
-  return torque.data;
+  return entries(torque);
 }
 
 }  // namespace sigmaik

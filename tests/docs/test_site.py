@@ -35,6 +35,7 @@ def test_every_public_name_of_python_has_an_entry(module, entries):
 
 def test_every_public_class_of_a_header_has_an_entry(entries):
     text = "\n".join(header.read_text(encoding="utf-8") for header in HEADERS.rglob("*.hpp"))
+    text = re.sub(r"^namespace sigmaik::detail \{.*?^\}  // namespace", "", text, flags=re.MULTILINE | re.DOTALL)
     names = set(re.findall(r"^(?:class|struct|enum class) (\w+)[^;<]*{$", text, re.MULTILINE))
     assert len(names) > 50
     known = {name.rpartition("::")[2] for name in entries["cpp"]}

@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include <sigmaik/chain.hpp>
+#include <sigmaik/layout.hpp>
 #include <sigmaik/types.hpp>
 
 namespace sigmaik {
@@ -147,5 +148,7 @@ class AnalyticIk {
   double tolerance_;     // a distance below the tolerance counts as zero [m]
   SixJoints lower_, upper_;
 };
+
+SIGMAIK_SAME_LAYOUT(AnalyticIk, AnalyticBranch, AnalyticSolutions, AnalyticNearest);
 
 }  // namespace sigmaik

@@ -8,6 +8,7 @@
 
 #include <sigmaik/chain.hpp>
 #include <sigmaik/indices.hpp>
+#include <sigmaik/layout.hpp>
 #include <sigmaik/singularities.hpp>
 #include <sigmaik/types.hpp>
 
@@ -50,5 +51,7 @@ class Avoidance {
   std::optional<SingularSets> sets_;
   IndexFunction index_;
 };
+
+SIGMAIK_SAME_LAYOUT(Avoidance, AvoidanceOptions);
 
 }  // namespace sigmaik

@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include <sigmaik/inverse.hpp>
+#include <sigmaik/layout.hpp>
 
 namespace sigmaik {
 
@@ -26,5 +27,7 @@ struct BatchShape {
 /// \throws Error where a shape or parameter is out of its range
 void solve_batch(const Method& method, double length_scale, const BatchShape& shape, const double* jacobian,
                  const double* twist, double* qdot, std::int8_t* status = nullptr, int threads = 1);
+
+SIGMAIK_SAME_LAYOUT(BatchShape);
 
 }  // namespace sigmaik

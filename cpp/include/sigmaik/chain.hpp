@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include <sigmaik/layout.hpp>
 #include <sigmaik/types.hpp>
 
 namespace sigmaik {
@@ -116,5 +117,7 @@ class Chain {
   };
   std::shared_ptr<const Model> model_;
 };
+
+SIGMAIK_SAME_LAYOUT(Chain, Inertia, Segment, JointLimits, JointConstants);
 
 }  // namespace sigmaik

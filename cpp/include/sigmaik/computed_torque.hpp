@@ -6,6 +6,7 @@
 #include <optional>
 
 #include <sigmaik/dynamics.hpp>
+#include <sigmaik/layout.hpp>
 #include <sigmaik/status.hpp>
 
 namespace sigmaik {
@@ -59,5 +60,7 @@ class ComputedTorque {
   Dynamics dynamics_;
   JointVector effort_;
 };
+
+SIGMAIK_SAME_LAYOUT(ComputedTorque, ComputedTorqueOptions, ComputedTorqueStep);
 
 }  // namespace sigmaik

@@ -27,6 +27,7 @@
 #include <sigmaik/chain.hpp>
 #include <sigmaik/dynamics.hpp>
 #include <sigmaik/kinematics.hpp>
+#include <sigmaik/layout.hpp>
 #include <sigmaik/least_squares.hpp>
 #include <sigmaik/limits.hpp>
 #include <sigmaik/status.hpp>
@@ -122,5 +123,7 @@ class ConstrainedIk {
   Pose reference_ = Pose::Identity();
   bool last_free_ = true;  // the last step was closed form, or met no limit and agreed with it
 };
+
+SIGMAIK_SAME_LAYOUT(ConstrainedIk, ConstrainedIkOptions, ConstrainedIkStep);
 
 }  // namespace sigmaik

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include <sigmaik/chain.hpp>
+#include <sigmaik/layout.hpp>
 
 namespace sigmaik {
 
@@ -47,15 +48,17 @@ class Dynamics {
   // These allocate, and are not for the loop.
 
   /// M (n, n) [kg·m²] at q (n,). \throws Error where a size is wrong
-  Eigen::MatrixXd mass_matrix(const Eigen::VectorXd& q) const;
+  JointMatrix mass_matrix(const JointRef& q) const;
   /// C(q, q̇) q̇ (n,) [N·m] at q, q̇ (n,). \throws Error where a size is wrong
-  Eigen::VectorXd coriolis(const Eigen::VectorXd& q, const Eigen::VectorXd& qdot) const;
+  JointVector coriolis(const JointRef& q, const JointRef& qdot) const;
   /// g (n,) [N·m] at q (n,): what holds the arm. \throws Error where a size is wrong
-  Eigen::VectorXd gravity(const Eigen::VectorXd& q) const;
+  JointVector gravity(const JointRef& q) const;
 
  private:
   struct Model;
   std::unique_ptr<Model> model_;
 };
+
+SIGMAIK_SAME_LAYOUT(Dynamics, DynamicsTerms);
 
 }  // namespace sigmaik

@@ -12,6 +12,7 @@
 
 #include <sigmaik/chain.hpp>
 #include <sigmaik/kinematics.hpp>
+#include <sigmaik/layout.hpp>
 #include <sigmaik/types.hpp>
 
 namespace sigmaik {
@@ -90,5 +91,7 @@ double reference_scale(const Chain& chain, double length_scale = 1.0);
 /// \param threads ≥ 1, the most that work at once
 void evaluate(const Chain& chain, const IndexFunction& index, std::size_t count, const double* q, double* value,
               double* gradient = nullptr, int threads = 1);
+
+SIGMAIK_SAME_LAYOUT(IndexFunction, IndexOptions);
 
 }  // namespace sigmaik

@@ -5,6 +5,7 @@
 #include <array>
 
 #include <sigmaik/chain.hpp>
+#include <sigmaik/layout.hpp>
 #include <sigmaik/types.hpp>
 
 namespace sigmaik {
@@ -29,5 +30,7 @@ Pose pose(const Chain& chain, const JointRef& q) noexcept;
 ///   k ≤ i: ∂J_i/∂q_k = [ω_k × v_i; ω_k × ω_i],   k > i: ∂J_i/∂q_k = [ω_i × v_k; 0]
 /// (a prismatic joint has ω = 0). Real time.
 void jacobian_gradient(const Jacobian& jacobian, JacobianGradient& gradient) noexcept;
+
+SIGMAIK_SAME_LAYOUT(ChainState);
 
 }  // namespace sigmaik

@@ -19,6 +19,7 @@
 
 #include <cstdint>
 
+#include <sigmaik/layout.hpp>
 #include <sigmaik/types.hpp>
 
 namespace sigmaik {
@@ -90,5 +91,7 @@ class LeastSquares {
   };
   Guess guess_;
 };
+
+SIGMAIK_SAME_LAYOUT(LeastSquares, LeastSquaresProblem, LeastSquaresSolution);
 
 }  // namespace sigmaik

@@ -35,6 +35,7 @@
 #include <cstdint>
 
 #include <sigmaik/chain.hpp>
+#include <sigmaik/layout.hpp>
 #include <sigmaik/types.hpp>
 
 namespace sigmaik {
@@ -155,5 +156,7 @@ class LimitTracker {
   VelocityBounds bounds_;
   std::uint16_t outside_ = 0, recovering_ = 0;
 };
+
+SIGMAIK_SAME_LAYOUT(LimitTracker, LimitOptions, VelocityBounds);
 
 }  // namespace sigmaik

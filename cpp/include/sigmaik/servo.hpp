@@ -9,6 +9,7 @@
 #include <sigmaik/avoidance.hpp>
 #include <sigmaik/chain.hpp>
 #include <sigmaik/kinematics.hpp>
+#include <sigmaik/layout.hpp>
 #include <sigmaik/least_squares.hpp>
 #include <sigmaik/limits.hpp>
 #include <sigmaik/status.hpp>
@@ -146,5 +147,7 @@ class Servo {
   JointVector nominal_, qdot_start_;
   double fade_ = 1.0;
 };
+
+SIGMAIK_SAME_LAYOUT(Servo, ServoOptions, ServoStep);
 
 }  // namespace sigmaik

@@ -19,6 +19,7 @@
 #include <thread>
 #include <vector>
 
+#include <sigmaik/layout.hpp>
 #include <sigmaik/servo.hpp>
 
 namespace sigmaik {
@@ -149,5 +150,7 @@ class ServoLoop {
   std::atomic<bool> stopping_{false}, thread_running_{false};
   std::atomic<std::int64_t> begun_{0}, ended_{0}, cycles_{0}, missed_{0}, unread_{0}, worst_delay_{0};
 };
+
+SIGMAIK_SAME_LAYOUT(ServoLoop, ServoLoopOptions, LoopSample, LoopStatistics);
 
 }  // namespace sigmaik

@@ -6,6 +6,7 @@
 ///
 /// Included here:
 ///
+///     layout.hpp           SIGMAIK_SAME_LAYOUT: a program whose types have other sizes does not link
 ///     types.hpp            JointVector, Jacobian, Twist [v; ω], Pose: sizes without heap
 ///     error.hpp            Error: what set-up refuses
 ///     status.hpp           Status: what a real-time call did
@@ -57,6 +58,7 @@
 #include <sigmaik/indices.hpp>
 #include <sigmaik/inverse.hpp>
 #include <sigmaik/kinematics.hpp>
+#include <sigmaik/layout.hpp>
 #include <sigmaik/least_squares.hpp>
 #include <sigmaik/limits.hpp>
 #include <sigmaik/pose.hpp>

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include <sigmaik/chain.hpp>
+#include <sigmaik/layout.hpp>
 #include <sigmaik/types.hpp>
 
 namespace sigmaik {
@@ -107,5 +108,7 @@ class SingularSets {
   explicit SingularSets(const Model* model) noexcept : model_(model) {}
   const Model* model_;  // static
 };
+
+SIGMAIK_SAME_LAYOUT(SingularSets, SingularSet, Potential, Tape);
 
 }  // namespace sigmaik

@@ -10,6 +10,7 @@
 #include <array>
 #include <cstdint>
 
+#include <sigmaik/layout.hpp>
 #include <sigmaik/types.hpp>
 
 namespace sigmaik {
@@ -63,5 +64,7 @@ class Spectrum {
   PaddedU u_ = PaddedU::Zero();
   PaddedV v_ = PaddedV::Zero();
 };
+
+SIGMAIK_SAME_LAYOUT(Spectrum);
 
 }  // namespace sigmaik

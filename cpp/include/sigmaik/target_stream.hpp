@@ -6,6 +6,7 @@
 #include <array>
 #include <cstdint>
 
+#include <sigmaik/layout.hpp>
 #include <sigmaik/pose.hpp>
 #include <sigmaik/types.hpp>
 
@@ -160,5 +161,7 @@ class TargetStream {
   double time_ = 0.0;
   bool placed_ = false, timed_ = false;  // whether last_.pose is set, and whether time_ is set
 };
+
+SIGMAIK_SAME_LAYOUT(TargetStream, TargetStreamOptions, SampleCounts, Target);
 
 }  // namespace sigmaik

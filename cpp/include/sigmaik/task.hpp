@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 
+#include <sigmaik/layout.hpp>
 #include <sigmaik/types.hpp>
 
 namespace sigmaik {
@@ -35,5 +36,7 @@ TaskJacobian select_rows(const Task& task, const Eigen::Matrix3d& rotation, cons
 
 /// The same for a twist.
 TaskVector select_rows(const Task& task, const Eigen::Matrix3d& rotation, const Twist& twist) noexcept;
+
+SIGMAIK_SAME_LAYOUT(Task);
 
 }  // namespace sigmaik

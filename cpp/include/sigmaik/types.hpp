@@ -8,6 +8,8 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
+#include <sigmaik/layout.hpp>
+
 namespace sigmaik {
 
 inline constexpr int kMaxJoints = 16;  ///< most movable joints of a chain
@@ -42,5 +44,15 @@ using JointRef = Eigen::Ref<const JointVector>;
 using TaskRef = Eigen::Ref<const TaskVector>;
 /// Argument: an m×n Jacobian, 1 ≤ m ≤ 6 and 1 ≤ n ≤ 16; a block of a larger matrix too.
 using TaskJacobianRef = Eigen::Ref<const TaskJacobian, 0, Eigen::OuterStride<>>;
+
+namespace detail {
+/// The Eigen that a program is compiled with, and whether its own matrices are row-major.
+template <int world, int major, bool row_major>
+struct EigenOf {};
+}  // namespace detail
+
+SIGMAIK_SAME_LAYOUT(JointVector, JointMatrix, TaskVector, TaskMatrix, Jacobian, TaskJacobian, Twist, Pose, JointRef,
+                    TaskRef, TaskJacobianRef,
+                    detail::EigenOf<EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, Eigen::Matrix3d::IsRowMajor>);
 
 }  // namespace sigmaik

@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include <sigmaik/inverse.hpp>
+#include <sigmaik/layout.hpp>
 #include <sigmaik/spectrum.hpp>
 #include <sigmaik/status.hpp>
 #include <sigmaik/task.hpp>
@@ -66,5 +67,7 @@ class VelocitySolver {
   Task task_;
   Spectrum spectrum_;
 };
+
+SIGMAIK_SAME_LAYOUT(VelocitySolver, Method, Solution);
 
 }  // namespace sigmaik

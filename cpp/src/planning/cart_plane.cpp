@@ -12,7 +12,7 @@
 namespace sigmaik::planning {
 namespace {
 
-using Eigen::Vector2d;
+using Vector2d = PlanarPoint;
 using sigmaik::detail::message;
 using sigmaik::detail::require;
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include <sigmaik/chain.hpp>
+#include <sigmaik/layout.hpp>
 #include <sigmaik/types.hpp>
 
 namespace sigmaik::planning {
@@ -82,5 +83,7 @@ class ArmSpheres {
   std::vector<int> joints_;
   int first_moving_ = 0;
 };
+
+SIGMAIK_SAME_LAYOUT(ArmSpheres, LinkSphere, SphereState);
 
 }  // namespace sigmaik::planning

@@ -26,13 +26,17 @@
 #include <Eigen/Core>
 
 #include <sigmaik/error.hpp>
+#include <sigmaik/layout.hpp>
+#include <sigmaik/types.hpp>
 
 namespace sigmaik::planning {
 
-using Eigen::VectorXd;
-using VectorRef = Eigen::Ref<const Eigen::VectorXd>;
+/// Numbers of any count. Eigen takes storage for an unaligned vector from std::malloc, whatever the compiler's flags
+/// are.
+using VectorXd = Eigen::Matrix<double, Eigen::Dynamic, 1, kLayout>;
+using VectorRef = Eigen::Ref<const VectorXd>;
 /// Positions (M, 2) [m].
-using PlanarPath = Eigen::Matrix<double, Eigen::Dynamic, 2, Eigen::RowMajor>;
+using PlanarPath = Eigen::Matrix<double, Eigen::Dynamic, 2, Eigen::RowMajor | Eigen::DontAlign>;
 
 /// Why there is no cart motion.
 enum class CartFault : std::int8_t {
@@ -141,5 +145,7 @@ struct CartDescent {
 /// \returns iterations done
 /// \throws Error where an argument is out of its range
 int cart_descent(const VectorRef& lower, const VectorRef& upper, VectorXd& x, const CartDescent& options = {});
+
+SIGMAIK_SAME_LAYOUT(CartLaw, CartOptions, CartRegion, CartDescent, PlanarPath);
 
 }  // namespace sigmaik::planning

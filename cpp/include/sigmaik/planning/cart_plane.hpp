@@ -17,24 +17,27 @@
 
 #include <Eigen/Core>
 
+#include <sigmaik/layout.hpp>
 #include <sigmaik/planning/cart.hpp>
 
 namespace sigmaik::planning {
 
+/// x and y.
+using PlanarPoint = Eigen::Matrix<double, 2, 1, kLayout>;
+
 /// What a motion in the plane must keep to.
 struct PlaneCartOptions {
-  Eigen::Vector2d lower = Eigen::Vector2d::Constant(-std::numeric_limits<double>::infinity());  ///< [m] of each axis
-  Eigen::Vector2d upper = Eigen::Vector2d::Constant(
-      std::numeric_limits<double>::infinity());  ///< [m]; equal: it stands
-  double margin = 0.0;                           ///< [m] ≥ 0, added to the radius
+  PlanarPoint lower = PlanarPoint::Constant(-std::numeric_limits<double>::infinity());  ///< [m] of each axis
+  PlanarPoint upper = PlanarPoint::Constant(std::numeric_limits<double>::infinity());   ///< [m]; equal: it stands
+  double margin = 0.0;  ///< [m] ≥ 0, added to the radius
   double max_radius =
       std::numeric_limits<double>::infinity();  ///< [m] > radius + margin, the farthest that the point may be
   /// [rad] by which the point's azimuth turns seen from the axis, positive about z, to within half a turn; none: any.
   std::optional<double> turn = std::nullopt;
   double duration = 1.0;  ///< [s] between the first and the last sample
-  Eigen::Vector2d max_speed = Eigen::Vector2d::Constant(std::numeric_limits<double>::infinity());  ///< [m/s] > 0
+  PlanarPoint max_speed = PlanarPoint::Constant(std::numeric_limits<double>::infinity());  ///< [m/s] > 0
   /// [m/s²] > 0 of each axis, second differences of the samples
-  Eigen::Vector2d max_acceleration = Eigen::Vector2d::Constant(std::numeric_limits<double>::infinity());
+  PlanarPoint max_acceleration = PlanarPoint::Constant(std::numeric_limits<double>::infinity());
   bool at_rest = false;  ///< starts and stops within max_acceleration, where that is finite
 };
 
@@ -58,7 +61,9 @@ struct PlaneCartLaw {
 /// best without them.
 /// \throws CartError with the reason where none was found
 /// \throws Error where an argument is out of its range
-PlaneCartLaw plane_cart_law(const PlanarPath& path, const Eigen::Vector2d& start, const Eigen::Vector2d& end,
-                            double radius, const PlaneCartOptions& options = {});
+PlaneCartLaw plane_cart_law(const PlanarPath& path, const PlanarPoint& start, const PlanarPoint& end, double radius,
+                            const PlaneCartOptions& options = {});
+
+SIGMAIK_SAME_LAYOUT(PlaneCartLaw, PlaneCartOptions);
 
 }  // namespace sigmaik::planning

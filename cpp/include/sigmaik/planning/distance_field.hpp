@@ -8,6 +8,8 @@
 
 #include <Eigen/Core>
 
+#include <sigmaik/layout.hpp>
+
 namespace sigmaik::planning {
 
 /// Signed distance to the nearest surface [m]: positive in free space, negative inside obstacles. A value: cheap to
@@ -55,5 +57,7 @@ class DistanceField {
   double cell_, inverse_cell_;
   std::shared_ptr<const std::vector<float>> nodes_;  // far more exact than the interpolation, in half the memory
 };
+
+SIGMAIK_SAME_LAYOUT(DistanceField);
 
 }  // namespace sigmaik::planning

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include <sigmaik/chain.hpp>
+#include <sigmaik/layout.hpp>
 #include <sigmaik/planning/batch_cost.hpp>
 #include <sigmaik/types.hpp>
 
@@ -81,5 +82,7 @@ class SupportPlanner {
 
 /// Velocities (states, n) of the natural cubic spline through (states, n), in unit time.
 std::vector<double> spline_velocities(const std::vector<double>& q, int states, int dof);
+
+SIGMAIK_SAME_LAYOUT(SupportPlanner, SupportStates, GradientOptions, StochasticOptions);
 
 }  // namespace sigmaik::planning

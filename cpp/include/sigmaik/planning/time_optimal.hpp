@@ -23,6 +23,7 @@
 #include <vector>
 
 #include <sigmaik/chain.hpp>
+#include <sigmaik/layout.hpp>
 #include <sigmaik/planning/joint_cost.hpp>
 
 namespace sigmaik::planning {
@@ -104,5 +105,7 @@ class TimeOptimal {
   TimeOptimalOptions options_;
   std::unique_ptr<Engine> engine_;
 };
+
+SIGMAIK_SAME_LAYOUT(TimeOptimal, TimeOptimalOptions, TimeOptimalProblem, TimeOptimalResult);
 
 }  // namespace sigmaik::planning
