@@ -2,9 +2,9 @@
 /// \file kdl.hpp
 /// From and to KDL::Chain.
 ///
-/// KDL::Chain and KDL::RigidBodyInertia hold no type of Eigen, so a program that includes the header may have any compiler
-/// flags. KDL::JntArray and KDL's other arrays hold vectors of the Eigen that KDL's library was compiled with: a file that
-/// makes or resizes one needs -DEIGEN_MAX_ALIGN_BYTES=16 beside -mavx or -march=native (Debian's KDL).
+/// KDL::Chain and KDL::RigidBodyInertia hold no type of Eigen, so a program that includes the header may have any
+/// compiler flags. KDL::JntArray and KDL's other arrays hold vectors of the Eigen that KDL's library was compiled with:
+/// a file that makes or resizes one needs -DEIGEN_MAX_ALIGN_BYTES=16 beside -mavx or -march=native (Debian's KDL).
 
 #include <string>
 
