@@ -1,18 +1,20 @@
 """Motions planned ahead, clear of singularities and obstacles.
 
-trajectory = sk.planning.time_optimal(chain, start, goal, avoid="potential", time_weight=600.0)
-trajectory.t, trajectory.q, trajectory.qdot, trajectory.qddot
-trajectory = sk.planning.gradient(chain, start, goal)              # or stochastic: along a good geometry-aware index
-trajectory.clearance.min_manipulability, trajectory.clearance.crossings
-trajectory.plot("motion.png", chain)
-done = sk.planning.play(trajectory, servo)                         # a servo that stands at its start
-done.q, done.max_position_error, done.max_joint_difference
-motion = sk.planning.cart_motion(flange_xy, start, end, radius)   # of the cart under an arm
-motion.x, motion.energy, motion.clearance
-motion = sk.planning.cart_motion_plane(flange_xy, (0, 0), (1, 0), radius)   # with two axes
-obstacles = sk.planning.Obstacles([sk.planning.Box(size=(0.8, 1.2, 0.04), pose=(0.6, 0.0, 0.4))])
-spheres = sk.planning.arm_spheres(chain, "arm.urdf")
-sk.planning.min_distance(spheres, obstacles, trajectory.q)
+Every planner returns a trajectory, which can be drawn and played:
+
+    trajectory = sk.planning.time_optimal(chain, start, goal, avoid="potential", time_weight=600.0)
+    trajectory.t, trajectory.q, trajectory.qdot, trajectory.qddot
+    trajectory = sk.planning.gradient(chain, start, goal)         # or stochastic: along a good geometry-aware index
+    trajectory.clearance.min_manipulability, trajectory.clearance.crossings
+    trajectory.plot("motion.png", chain)
+    done = sk.planning.play(trajectory, servo)                         # a servo that stands at its start
+    done.q, done.max_position_error, done.max_joint_difference
+    motion = sk.planning.cart_motion(flange_xy, start, end, radius)   # of the cart under an arm
+    motion.x, motion.energy, motion.clearance
+    motion = sk.planning.cart_motion_plane(flange_xy, (0, 0), (1, 0), radius)   # with two axes
+    obstacles = sk.planning.Obstacles([sk.planning.Box(size=(0.8, 1.2, 0.04), pose=(0.6, 0.0, 0.4))])
+    spheres = sk.planning.arm_spheres(chain, "arm.urdf")
+    sk.planning.min_distance(spheres, obstacles, trajectory.q)
 """
 
 from sigmaik._core import (

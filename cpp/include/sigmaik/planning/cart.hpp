@@ -34,6 +34,7 @@ namespace sigmaik::planning {
 /// Numbers of any count. Eigen takes storage for an unaligned vector from std::malloc, whatever the compiler's flags
 /// are.
 using VectorXd = Eigen::Matrix<double, Eigen::Dynamic, 1, kLayout>;
+/// Argument: one number a sample, (M,).
 using VectorRef = Eigen::Ref<const VectorXd>;
 /// Positions (M, 2) [m].
 using PlanarPath = Eigen::Matrix<double, Eigen::Dynamic, 2, Eigen::RowMajor | Eigen::DontAlign>;
@@ -56,8 +57,10 @@ const char* to_string(CartFault fault) noexcept;
 /// No cart motion keeps out of the region, with what would have to change.
 class CartError : public Error {
  public:
+  /// What is wrong, the largest radius [m] that would do, and both in words.
   CartError(CartFault fault, double feasible_radius, const std::string& text)
       : Error(text), fault_(fault), feasible_radius_(feasible_radius) {}
+  /// What is wrong.
   CartFault fault() const noexcept { return fault_; }
   /// [m] The largest radius (to nine digits) for which there is a motion; NaN: none, or not known.
   double feasible_radius() const noexcept { return feasible_radius_; }
@@ -84,22 +87,25 @@ struct CartOptions {
 
 /// A connected part of the forbidden region, in the plane of time and cart position.
 struct CartRegion {
-  double first, last;  ///< [samples] where it begins and ends: its tips, between samples
-  int side;            ///< 1: the law passes above λ+; −1: below λ−
+  double first;  ///< [samples] where it begins: its tip, between samples
+  double last;   ///< [samples] where it ends: its tip, between samples
+  int side;      ///< 1: the law passes above λ+; −1: below λ−
 };
 
 /// A law of the cart, and what it had to keep out of.
 struct CartLaw {
-  VectorXd x;             ///< (M,) [m] at the samples
-  VectorXd lower, upper;  ///< (M,) [m] λ∓ for radius + margin; +∞ and −∞ where nothing is forbidden
-  VectorXd multipliers;   ///< (M,) [m] μ: positive where the law is held up, negative where it is held down
-  std::vector<CartRegion> regions;
-  /// The string's corners: where [samples], and at which position [m]; straight between them. A corner at the tip of a
-  /// region can lie between samples.
-  std::vector<double> corners, corner_x;
-  double energy = 0.0;  ///< [m²] Σ (Δx)²; where a corner lies between samples Σ (Δx)²/Δi, the string's own
-  double turn = 0.0;    ///< [rad] of P's azimuth
-  int strings = 0;      ///< taut strings drawn
+  VectorXd x;                       ///< (M,) [m] at the samples
+  VectorXd lower;                   ///< (M,) [m] λ− for radius + margin; +∞ where nothing is forbidden
+  VectorXd upper;                   ///< (M,) [m] λ+ for radius + margin; −∞ where nothing is forbidden
+  VectorXd multipliers;             ///< (M,) [m] μ: positive where the law is held up, negative where it is held down
+  std::vector<CartRegion> regions;  ///< parts of the forbidden region, in the order of time
+  /// The string's corners [samples]; the string is straight between them. A corner at the tip of a region can lie
+  /// between samples.
+  std::vector<double> corners;
+  std::vector<double> corner_x;  ///< the cart's positions at the corners [m]
+  double energy = 0.0;           ///< [m²] Σ (Δx)²; where a corner lies between samples Σ (Δx)²/Δi, the string's own
+  double turn = 0.0;             ///< [rad] of P's azimuth
+  int strings = 0;               ///< taut strings drawn
 };
 
 /// λ∓ (6) of every sample [m]; +∞ and −∞, the empty interval, where |y| ≥ radius.

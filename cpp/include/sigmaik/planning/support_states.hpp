@@ -21,13 +21,14 @@ namespace sigmaik::planning {
 
 /// A motion: (states, n) in C order, ends included.
 struct SupportStates {
-  std::vector<double> q;
-  double cost = 0.0;      ///< of the states between the ends
-  double distance = 0.0;  ///< ‖q − μ‖² in K̄⁻¹
-  int iterations = 0;
+  std::vector<double> q;   ///< (states, n) [rad or m]
+  double cost = 0.0;       ///< of the states between the ends
+  double distance = 0.0;   ///< ‖q − μ‖² in K̄⁻¹
+  int iterations = 0;      ///< iterations taken
   bool converged = false;  ///< stopped by its own rule, not by the number of iterations
 };
 
+/// Settings of SupportPlanner::gradient().
 struct GradientOptions {
   int states = 21;             ///< N + 1, 3 to 1000
   double prior_weight = 10.0;  ///< > 0: what ‖q − μ‖² in K̄⁻¹ weighs against the cost
@@ -35,6 +36,7 @@ struct GradientOptions {
   double tolerance = 1e-4;     ///< ≥ 0: stops where an iteration gains less than this part of the objective
 };
 
+/// Settings of SupportPlanner::stochastic().
 struct StochasticOptions {
   int states = 21;             ///< N + 1, 3 to 1000
   int samples = 10;            ///< ≥ 2, of an iteration
@@ -44,7 +46,7 @@ struct StochasticOptions {
   double temperature = 0.1;    ///< > 0: λ of the weights exp(−(G − G_min)/(λ (G_max − G_min))) (15), normalised
   double prior_weight = 10.0;  ///< ≥ 0: as for the gradient; it keeps joints that the cost does not see from drifting
   double tolerance = 1e-3;     ///< ≥ 0: stops where eight iterations together gain less than this part of the objective
-  std::uint64_t seed = 0;
+  std::uint64_t seed = 0;      ///< of the random numbers: the same seed gives the same plan
 };
 
 /// Plans for one arm and one cost, with the covariance's factors made once. One a thread.
@@ -53,7 +55,9 @@ class SupportPlanner {
   /// \throws Error where the number of states is out of its range, or the cost is for another number of joints
   SupportPlanner(Chain chain, BatchCostPtr cost, int states);
   ~SupportPlanner();
+  /// Takes over the memory of another; the other may only be destroyed or assigned to.
   SupportPlanner(SupportPlanner&&) noexcept;
+  /// Takes over the memory of another; the other may only be destroyed or assigned to.
   SupportPlanner& operator=(SupportPlanner&&) noexcept;
 
   /// Minimises Σ cost(q_i) + w ‖q − μ‖² in K̄⁻¹ by L-BFGS in x, q = μ + C x, K̄ = C Cᵀ, from `guess` (states, n), or from
@@ -72,7 +76,9 @@ class SupportPlanner {
   /// \throws Error as gradient()
   SupportStates draw(const JointVector& start, const JointVector& goal, double deviation, std::uint64_t seed);
 
+  /// Number of support states.
   int states() const noexcept;
+  /// The arm.
   const Chain& chain() const noexcept;
 
  private:

@@ -42,8 +42,10 @@ struct TimeOptimalOptions {
 
 /// Ends of a motion, and where to look for it.
 struct TimeOptimalProblem {
-  JointVector start, goal;                    ///< (n,) [rad or m] within the limits; whole turns count
-  JointVector start_velocity, goal_velocity;  ///< (n,) [rad/s or m/s] within the limits; empty: at rest
+  JointVector start;           ///< (n,) [rad or m] within the limits; whole turns count
+  JointVector goal;            ///< (n,) [rad or m] within the limits; whole turns count
+  JointVector start_velocity;  ///< (n,) [rad/s or m/s] within the limits; empty: at rest
+  JointVector goal_velocity;   ///< (n,) [rad/s or m/s] within the limits; empty: at rest
   /// (n,) [rad or m] by how much the first guess, the straight line, is bent half-way; empty: not at all.
   JointVector bend;
 };
@@ -60,14 +62,15 @@ const char* to_string(PlanStatus status) noexcept;
 
 /// A motion on nodes t_k = k h.
 struct TimeOptimalResult {
-  PlanStatus status = PlanStatus::Failed;
-  double duration = 0.0;  ///< [s] t_F = N h
-  double cost = 0.0;      ///< the objective
-  double gap = 0.0;       ///< estimate of what is left to gain
-  int iterations = 0;     ///< Newton steps, of all starts
-  int starts = 0;         ///< first guesses tried
-  /// (N, n) in C order: positions, velocities, accelerations; empty where failed. q̈ of the last node is zero.
-  std::vector<double> q, qdot, qddot;
+  PlanStatus status = PlanStatus::Failed;  ///< what solve() did
+  double duration = 0.0;                   ///< [s] t_F = N h
+  double cost = 0.0;                       ///< the objective
+  double gap = 0.0;                        ///< estimate of what is left to gain
+  int iterations = 0;                      ///< Newton steps, of all starts
+  int starts = 0;                          ///< first guesses tried
+  std::vector<double> q;                   ///< (N, n) in C order: positions [rad or m]; empty where failed
+  std::vector<double> qdot;                ///< (N, n) in C order: velocities [rad/s or m/s]; empty where failed
+  std::vector<double> qddot;               ///< (N, n) in C order: accelerations [rad/s² or m/s²], zero at the last node
 };
 
 /// Plans for one arm and one cost, again and again: keeps its memory. One a thread.
@@ -78,20 +81,26 @@ class TimeOptimal {
   ///     joint's acceleration
   TimeOptimal(Chain chain, JointCostPtr cost, const TimeOptimalOptions& options = {});
   ~TimeOptimal();
+  /// Takes over the memory of another; the other may only be destroyed or assigned to.
   TimeOptimal(TimeOptimal&&) noexcept;
+  /// Takes over the memory of another; the other may only be destroyed or assigned to.
   TimeOptimal& operator=(TimeOptimal&&) noexcept;
 
   /// \throws Error where an end is outside its limits, not finite or of a wrong size
   TimeOptimalResult solve(const TimeOptimalProblem& problem);
 
+  /// The arm.
   const Chain& chain() const noexcept { return chain_; }
+  /// L, or null for none.
   const JointCostPtr& cost() const noexcept { return cost_; }
+  /// The settings, as given.
   const TimeOptimalOptions& options() const noexcept { return options_; }
 
   /// One start of the method, for one width of vectors.
   class Engine {
    public:
     virtual ~Engine() = default;
+    /// A motion from one first guess.
     virtual TimeOptimalResult solve(const TimeOptimalProblem& problem) = 0;
   };
 
