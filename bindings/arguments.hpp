@@ -125,6 +125,15 @@ using Strings = py::typing::Tuple<py::str, py::ellipsis>;
 using Indices = py::typing::Tuple<py::int_, py::ellipsis>;
 Indices indices(std::uint32_t bits);
 
+/// sigmaik.Method: the base class of every rule in Python. It has no C++ type: a rule is a plain struct.
+class SIGMAIK_HIDDEN MethodClass {};
+
+/// A rule, or the name of one with its parameters: "jparse:gamma=0.1".
+/// \throws Error with the names, where there is no such method or parameter, and where the object is neither
+bool load_method(py::handle object, Method& method);
+
+py::object method_to_python(const Method& method);
+
 void bind_status(py::module_& m);
 void bind_chain(py::module_& m);
 void bind_methods(py::module_& m);
@@ -147,4 +156,15 @@ void bind_obstacles(py::module_& m);
 template <>
 struct pybind11::detail::handle_type_name<sigmaik::bindings::ArrayLike> {
   static constexpr auto name = const_name("numpy.typing.ArrayLike");
+};
+
+/// Wherever a method is an argument, its name is accepted.
+template <>
+struct pybind11::detail::type_caster<sigmaik::Method> {
+  PYBIND11_TYPE_CASTER(sigmaik::Method, io_name("sigmaik._core.Method | str", "sigmaik._core.Method"));
+
+  bool load(handle object, bool /*convert*/) { return sigmaik::bindings::load_method(object, value); }
+  static handle cast(const sigmaik::Method& method, return_value_policy /*policy*/, handle /*parent*/) {
+    return sigmaik::bindings::method_to_python(method).release();
+  }
 };

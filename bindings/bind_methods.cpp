@@ -1,194 +1,176 @@
-#include <optional>
+#include <string>
+#include <tuple>
+#include <type_traits>
 
 #include "arguments.hpp"
+#include "fields.hpp"
+
+// Every class here is made from the rule's own table: see sigmaik/rules/jparse.hpp.
+
+namespace sigmaik::bindings {
+
+class SIGMAIK_HIDDEN RuleClasses : public py::tuple {
+  using py::tuple::tuple;
+};
+
+}  // namespace sigmaik::bindings
+
+template <>
+struct pybind11::detail::handle_type_name<sigmaik::bindings::RuleClasses> {
+  static constexpr auto name = const_name("tuple[type[sigmaik._core.Method], ...]");
+};
 
 namespace sigmaik::bindings {
 namespace {
 
-const char* to_string(DampingRule rule) {
-  switch (rule) {
-    case DampingRule::NumericalFiltering: return "numerical_filtering";
-    case DampingRule::Manipulability: return "manipulability";
-    case DampingRule::SmallestSingularValue: return "smallest_singular_value";
+// A value that stands for "not given" is None in Python.
+template <typename R, typename Value>
+py::object to_python(const R& rule, const sigmaik::Parameter<R, Value>& p) {
+  const Value value = rule.*p.member;
+  return p.none && value == *p.none ? py::none() : Argument<Value>::to(value);
+}
+
+template <typename R, typename Value>
+void from_python(R& rule, const sigmaik::Parameter<R, Value>& p, py::handle object) {
+  if (p.none && object.is_none()) {
+    rule.*p.member = *p.none;
+    return;
   }
-  return "unknown";
+  const std::string what = std::string(R::kName) + ": " + p.name;
+  const Value value = Argument<Value>::from(object, what.c_str());
+  if (p.none && value == *p.none) throw Error(what + " = " + Argument<Value>::text(value) + " is no value; give None");
+  rule.*p.member = value;
 }
 
-DampingRule damping_rule(const std::string& text) {
-  for (const DampingRule rule :
-       {DampingRule::NumericalFiltering, DampingRule::Manipulability, DampingRule::SmallestSingularValue}) {
-    if (text == to_string(rule)) return rule;
-  }
-  throw Error("AdaptiveDampedLeastSquares: rule = '" + text +
-              "' must be 'numerical_filtering', 'manipulability' or 'smallest_singular_value'");
+template <typename R>
+py::dict parameters(const R& rule) {
+  py::dict out;
+  for_each_parameter<R>([&](const auto& p) { out[p.name] = to_python(rule, p); });
+  return out;
 }
 
-template <typename Rule>
-Rule checked(const Rule& rule) {
-  validate(rule);
-  return rule;
+template <typename R>
+void bind_constructor(py::class_<R>& c) {
+  Signature s{R::kName, {}, std::tuple_size_v<decltype(R::parameters())>};
+  for_each_parameter<R>([&](const auto& p) {
+    const auto value = R{}.*p.member;
+    using A = Argument<std::decay_t<decltype(value)>>;
+    const bool none = p.none && value == *p.none;
+    s.slots.push_back({p.name, A::type() + (p.none ? " | None" : ""), none ? "None" : A::text(value), p.doc});
+  });
+  py::options mute;
+  mute.disable_function_signatures();
+  c.def(py::init([s](const py::args& args, const py::kwargs& kwargs) {
+          const std::vector<py::handle> given = s.sort(args, kwargs);
+          R rule{};
+          auto object = given.begin();
+          for_each_parameter<R>([&](const auto& p) {
+            if (object->ptr() != nullptr) from_python(rule, p, *object);
+            ++object;
+          });
+          check_rule(rule);
+          return rule;
+        }),
+        s.docstring("__init__", Argument<R>::type(), "None", "").c_str());
 }
 
-// repr, equality and pickling, from the constructor's arguments by name.
-template <typename Rule, typename Arguments>
-void finish(py::class_<Rule>& c, Arguments arguments) {
-  c.def("__repr__", [arguments](const py::object& self) {
-    std::string text = py::type::of(self).attr("__name__").cast<std::string>() + "(";
-    bool first = true;
-    for (const auto& [key, value] : py::dict(arguments(self.cast<const Rule&>()))) {
-      text += (first ? "" : ", ") + key.template cast<std::string>() + "=" +
-              py::repr(value).template cast<std::string>();
-      first = false;
+template <typename R>
+py::object bind_rule(py::module_& m) {
+  auto c = py::class_<R>(m, R::kName, py::type::of<MethodClass>(), R::kDoc);
+  bind_constructor(c);
+  for_each_parameter<R>([&](const auto& p) {
+    using Value = typename std::decay_t<decltype(p)>::value_type;
+    using Spelled = std::conditional_t<std::is_enum_v<Value>, std::string, Value>;
+    if (p.none) {
+      c.def_property_readonly(
+          p.name, [p](const R& rule) { return to_python(rule, p).template cast<std::optional<Spelled>>(); }, p.doc);
+    } else {
+      c.def_property_readonly(
+          p.name, [p](const R& rule) { return to_python(rule, p).template cast<Spelled>(); }, p.doc);
     }
-    return text + ")";
   });
-  c.def("__eq__", [arguments](const Rule& a, const py::object& b) {
-    return py::isinstance<Rule>(b) && arguments(a).equal(arguments(b.cast<const Rule&>()));
-  });
-  c.def("__hash__", [arguments](const Rule& self) {  // by the values, as equality: −0.0 is 0.0
-    return py::hash(py::make_tuple(py::type::of<Rule>(), py::tuple(arguments(self).attr("values")())));
-  });
-  using Recipe = py::typing::Tuple<py::object, py::typing::Tuple<py::object, py::ellipsis>>;
-  c.def("__reduce__", [arguments](const py::object& self) -> Recipe {
-    const auto partial = py::module_::import("functools").attr("partial");
-    return py::make_tuple(partial(py::type::of(self), **arguments(self.cast<const Rule&>())), py::tuple());
-  });
+  c.attr("short_name") = R::kShortName;
+  c.attr("title") = R::kTitle;
+  return c;
 }
 
-template <typename Rule>
-void bind_gamma_only(py::module_& m, const char* name, const char* doc) {
-  auto c = py::class_<Rule>(m, name, doc);
-  c.def(py::init([](double gamma) { return checked(Rule{gamma}); }), py::arg("gamma") = 0.1,
-        "gamma: threshold in (0, 1] on σ_i/σ_max.");
-  c.def_readonly("gamma", &Rule::gamma, "Threshold on σ_i/σ_max.");
-  finish(c, [](const Rule& r) {
-    py::dict d;
-    d["gamma"] = r.gamma;
-    return d;
-  });
+py::dict parameters(const py::object& self) {
+  Method method;
+  load_method(self, method);
+  return std::visit(
+      []<typename R>(const R& rule) -> py::dict {
+        if constexpr (std::is_same_v<R, CustomRule>) {
+          return {};
+        } else {
+          return parameters(rule);
+        }
+      },
+      method);
 }
 
 }  // namespace
 
+bool load_method(py::handle object, Method& method) {
+  if (py::isinstance<py::str>(object)) {
+    const py::object named = py::module_::import("sigmaik.methods").attr("parse")(object);
+    return load_method(named, method);
+  }
+  bool found = false;
+  Rules::for_each([&]<typename R>(const R&) {
+    if (found || !py::isinstance<R>(object)) return;
+    method = object.cast<const R&>();
+    found = true;
+  });
+  if (!found) refuse("method", "a sigmaik.Method, or the name of one", object);
+  return found;
+}
+
+py::object method_to_python(const Method& method) {
+  return std::visit(
+      []<typename R>(const R& rule) -> py::object {
+        if constexpr (std::is_same_v<R, CustomRule>) {
+          throw Error(std::string("the rule ") + rule.name() + " is an application's own: Python has no class for it");
+        } else {
+          return py::cast(rule);
+        }
+      },
+      method);
+}
+
 void bind_methods(py::module_& m) {
-  {
-    auto c = py::class_<PseudoInverse>(
-        m, "PseudoInverse",
-        "Moore and Penrose's inverse, truncated: u_iᵀẋ/σ_i, and 0 where σ_i ≤ tolerance·σ_max.\n\n"
-        "Exact, but joint speeds grow as 1/σ_i towards a singularity.");
-    c.def(py::init([](double tolerance) { return checked(PseudoInverse{tolerance}); }), py::arg("tolerance") = 1e-12,
-          "tolerance: fraction of σ_max in (0, 1] at and below which directions are dropped.");
-    c.def_readonly("tolerance", &PseudoInverse::tolerance);
-    finish(c, [](const PseudoInverse& r) {
-      py::dict d;
-      d["tolerance"] = r.tolerance;
-      return d;
-    });
-  }
-  {
-    auto c = py::class_<DampedLeastSquares>(
-        m, "DampedLeastSquares",
-        "Constant damping: σ_i/(σ_i²+λ²) u_iᵀẋ (Wampler 1986; Nakamura and Hanafusa 1986).\n\n"
-        "Smooth, and inexact everywhere by λ²/(σ_i²+λ²). |q̇| ≤ |ẋ|/(2λ).");
-    c.def(py::init([](double damping) { return checked(DampedLeastSquares{damping}); }), py::arg("damping") = 0.1,
-          "damping: λ > 0, in the units of σ.");
-    c.def_readonly("damping", &DampedLeastSquares::damping);
-    finish(c, [](const DampedLeastSquares& r) {
-      py::dict d;
-      d["damping"] = r.damping;
-      return d;
-    });
-  }
-  {
-    auto c = py::class_<AdaptiveDampedLeastSquares>(
-        m, "AdaptiveDampedLeastSquares",
-        "Damping that grows towards a singularity and vanishes away from it. λ is `damping`, ε or w₀ `threshold`.\n\n"
-        "rule 'numerical_filtering': only directions with σ_i < ε, λ_i² = (1 − (σ_i/ε)²) λ² (Maciejewski and Klein\n"
-        "    1988, as in Chiaverini 1997; continuous too where several directions are small)\n"
-        "rule 'manipulability': all directions, λ² (1 − w/w₀)² where w = Π σ_i < w₀ (Nakamura and Hanafusa 1986)\n"
-        "rule 'smallest_singular_value': all directions, (1 − (σ_min/ε)²) λ² where σ_min < ε (Chiaverini 1997)");
-    c.def(py::init([](const std::string& rule, double damping, const std::optional<double>& threshold, bool relative) {
-            if (threshold && !(*threshold > 0.0)) {
-              throw Error("AdaptiveDampedLeastSquares: threshold = " +
-                          py::str(py::float_(*threshold)).cast<std::string>() + " must be above 0");
-            }
-            return checked(AdaptiveDampedLeastSquares{damping_rule(rule), damping, threshold.value_or(0.0), relative});
-          }),
-          py::arg("rule") = "numerical_filtering", py::arg("damping") = 0.1, py::arg("threshold") = py::none(),
-          py::arg("relative") = true,
-          "damping: λ > 0 at the singularity. threshold: > 0; by default 0.1, or 1e-3 for 'manipulability'.\n"
-          "relative: λ and ε are fractions of σ_max, w₀ of σ_max to the number of directions, so that units and size\n"
-          "of the arm do not matter; False: absolute values, as in the papers.");
-    c.def_property_readonly("rule", [](const AdaptiveDampedLeastSquares& r) { return to_string(r.rule); });
-    c.def_readonly("damping", &AdaptiveDampedLeastSquares::damping);
-    c.def_property_readonly("threshold", [](const AdaptiveDampedLeastSquares& r) -> std::optional<double> {
-      return r.threshold > 0.0 ? std::optional(r.threshold) : std::nullopt;
-    });
-    c.def_readonly("relative", &AdaptiveDampedLeastSquares::relative);
-    finish(c, [](const AdaptiveDampedLeastSquares& r) {
-      py::dict d;
-      d["rule"] = to_string(r.rule);
-      d["damping"] = r.damping;
-      d["threshold"] = r.threshold > 0.0 ? py::object(py::float_(r.threshold)) : py::none();
-      d["relative"] = r.relative;
-      return d;
-    });
-  }
-  {
-    auto c = py::class_<SelectivelyDampedLeastSquares>(
-        m, "SelectivelyDampedLeastSquares",
-        "Each direction clamped by what it moves the joints for what it moves the tip (Buss and Kim 2005).\n\n"
-        "Their angle limit per update is a joint speed here. |q̇_j| ≤ max_speed.");
-    c.def(py::init([](double max_speed) { return checked(SelectivelyDampedLeastSquares{max_speed}); }),
-          py::arg("max_speed") = 0.7853981633974483, "max_speed: [rad/s] > 0 (the paper's γ_max).");
-    c.def_readonly("max_speed", &SelectivelyDampedLeastSquares::max_speed);
-    finish(c, [](const SelectivelyDampedLeastSquares& r) {
-      py::dict d;
-      d["max_speed"] = r.max_speed;
-      return d;
-    });
-  }
-  {
-    auto c = py::class_<JParse>(
-        m, "JParse",
-        "J-PARSE (Guptasarma et al.): u_iᵀẋ/σ_i where σ_i > γσ_max, else σ_i/(γσ_max)² u_iᵀKẋ.\n\n"
-        "Regular directions are exact; along a singular one motion fades out at the singularity and can leave it\n"
-        "again. |q̇| ≤ |ẋ|/(γσ_max) for unit gains.");
-    c.def(py::init([](double gamma, double gain_linear, double gain_angular, bool continuous, bool singular_posture) {
-            return checked(JParse{gamma, gain_linear, gain_angular, continuous, singular_posture});
-          }),
-          py::arg("gamma") = 0.1, py::arg("gain_linear") = 1.0, py::arg("gain_angular") = 1.0,
-          py::arg("continuous") = true, py::arg("singular_posture") = false,
-          "gamma: threshold in (0, 1] on σ_i/σ_max.\n"
-          "gain_linear, gain_angular: the paper's K ≥ 0, for the command's linear and angular rows.\n"
-          "continuous: the gain is K at σ_i = 0 and goes linearly to 1 at the threshold; False: K throughout, as\n"
-          "published, which jumps at the threshold where K ≠ 1.\n"
-          "singular_posture: the posture acts along singular directions, as far as J-PARSE's own inverse does not, by "
-          "its\n"
-          "I − J⁺J: an arm that was stretched out folds back to the side of its posture. False: it does not, as "
-          "published.");
-    c.def_readonly("gamma", &JParse::gamma);
-    c.def_readonly("gain_linear", &JParse::gain_linear);
-    c.def_readonly("gain_angular", &JParse::gain_angular);
-    c.def_readonly("continuous", &JParse::continuous);
-    c.def_readonly("singular_posture", &JParse::singular_posture);
-    finish(c, [](const JParse& r) {
-      py::dict d;
-      d["gamma"] = r.gamma;
-      d["gain_linear"] = r.gain_linear;
-      d["gain_angular"] = r.gain_angular;
-      d["continuous"] = r.continuous;
-      d["singular_posture"] = r.singular_posture;
-      return d;
-    });
-  }
-  bind_gamma_only<JacobianProjection>(m, "JacobianProjection",
-                                      "Ablation of J-PARSE (eq. 62): u_iᵀẋ/σ_i where σ_i > γσ_max, else 0; the posture "
-                                      "acts in the directions that are left out.");
-  bind_gamma_only<JacobianSafety>(m, "JacobianSafety", "Ablation of J-PARSE (eq. 63): u_iᵀẋ/max(σ_i, γσ_max).");
-  bind_gamma_only<JacobianSafetyProjection>(m, "JacobianSafetyProjection",
-                                            "Ablation of J-PARSE (eq. 64): like JacobianProjection, but the posture "
-                                            "does not act in the directions that are left out.");
+  py::class_<MethodClass> base(
+      m, "Method",
+      "A rule with its parameters: what a method does with each singular direction. The base class of all of them.\n\n"
+      "Wherever a method is an argument, its name is accepted too: \"jparse:gamma=0.2\", see sigmaik.methods.");
+  base.def_property_readonly(
+      "parameters", [](const py::object& self) -> py::typing::Dict<py::str, py::object> { return parameters(self); },
+      "The constructor's arguments by name.");
+  base.attr("short_name") = "";
+  base.attr("title") = "";
+  base.def("__repr__", [](const py::object& self) {
+    std::string text;
+    for (const auto& [key, value] : parameters(self)) {
+      text += (text.empty() ? "" : ", ") + key.cast<std::string>() + "=" + py::repr(value).cast<std::string>();
+    }
+    return py::type::of(self).attr("__name__").cast<std::string>() + "(" + text + ")";
+  });
+  base.def("__hash__", [](const py::object& self) {  // by the values, as equality: −0.0 is 0.0
+    return py::hash(py::make_tuple(py::type::of(self), py::tuple(parameters(self).attr("values")())));
+  });
+  base.def("__eq__", [](const py::object& self, const py::object& other) {
+    return py::type::of(self).is(py::type::of(other)) && parameters(self).equal(parameters(other));
+  });
+  using Recipe = py::typing::Tuple<py::object, py::typing::Tuple<py::object, py::ellipsis>>;
+  base.def("__reduce__", [](const py::object& self) -> Recipe {
+    const auto partial = py::module_::import("functools").attr("partial");
+    return py::make_tuple(partial(py::type::of(self), **parameters(self)), py::tuple());
+  });
+
+  py::list classes;
+  Rules::for_each([&]<typename R>(const R&) { classes.append(bind_rule<R>(m)); });
+  m.def(
+      "rules", [all = py::tuple(classes)]() -> RuleClasses { return RuleClasses(all); },
+      "The class of every rule, in the order of lists and tables.");
 }
 
 }  // namespace sigmaik::bindings

@@ -56,14 +56,6 @@ std::string text_of(double value) {
   return py::repr(py::float_(value)).cast<std::string>();
 }
 
-std::string Argument<Method>::type() {
-  return []<typename... Rules>(std::type_identity<std::variant<Rules...>>) {
-    std::string out;
-    ((out += (out.empty() ? "" : " | ") + Argument<Rules>::type()), ...);
-    return out;
-  }(std::type_identity<Method>{});
-}
-
 std::string Argument<Twist>::text(const Twist& value) {
   if (value == Twist::Constant(value[0])) return text_of(value[0]);
   std::string out;

@@ -71,6 +71,13 @@ struct Fields;
 template <typename Enum>
 struct Words;
 
+/// The parameters of a rule bring their words along.
+template <typename Enum>
+  requires requires { Choices<Enum>::all; }
+struct Words<Enum> {
+  static constexpr auto all = Choices<Enum>::all;
+};
+
 template <typename Enum>
 struct Word {
   const char* text;  // null: None
@@ -222,12 +229,14 @@ struct Argument<std::optional<T>> {
   static py::object to(const std::optional<T>& value) { return value ? Argument<T>::to(*value) : py::none(); }
 };
 
-/// Any of the rules.
+/// Any of the rules, or the name of one.
 template <>
 struct Argument<Method> {
   static constexpr bool kNone = false;
-  static std::string type();
-  static Method from(py::handle object, const char* what) { return converted<Method>(object, what, "a method"); }
+  static std::string type() { return "sigmaik._core.Method | str"; }
+  static Method from(py::handle object, const char* what) {
+    return converted<Method>(object, what, "a sigmaik.Method, or the name of one");
+  }
   static py::object to(const Method& value) { return py::cast(value); }
 };
 

@@ -1,7 +1,7 @@
 """Checks that the map of the headers in sigmaik.hpp is true: check_map.py [INCLUDE_DIRECTORY].
 
 The map has a line for each public header, NAME  WHAT IT HOLDS, in two sections: what sigmaik.hpp includes, and what it
-does not. Each header needs only those above it.
+does not. Each header needs only those above it. A NAME that ends in / is a directory, whose headers need no lines.
 """
 
 import re
@@ -41,24 +41,38 @@ def findings(directory: Path) -> list[str]:
         if name not in seen:
             seen.add(name)
             for other in includes(headers.get(name, "")):
-                reached(other, seen)
+                reached(line_of(other), seen)
         return seen
 
     included, by_name = map_lines(umbrella)
     names = [name for name, _ in included + by_name]
+    for name in [name for name in names if name.endswith("/")]:
+        files = [header for header in headers if header.startswith(name)]
+        if not files:
+            continue  # there is no such header
+        headers[name] = "\n".join(headers[file] for file in files)
+        for file in files:
+            del headers[file]
+
+    def line_of(header: str) -> str:
+        return next((name for name in names if name.endswith("/") and header.startswith(name)), header)
+
     found = [f"{name} has {names.count(name)} lines" for name in sorted(set(names)) if names.count(name) > 1]
     found += [f"{name} has no line" for name in sorted(set(headers) - set(names))]
     found += [f"{name} has a line, but there is no such header" for name in names if name not in headers]
     for above, (name, what) in enumerate(included + by_name):
         text = headers.get(name, "")
-        found += [f"{name} needs {i}, which stands below it" for i in includes(text) if i not in names[:above]]
+        needed = {line_of(i) for i in includes(text)} - {line_of(name)}
+        found += [f"{name} needs {i}, which stands below it" for i in sorted(needed) if i not in names[:above]]
         declared = re.findall(r"[A-Za-z_][A-Za-z_0-9]+", what.partition(":")[0]) if ":" in what else []
         found += [f"{name} does not speak of {word}" for word in declared if not re.search(rf"\b{word}\b", text)]
         if not what:
             found.append(f"the line of {name} does not say what it holds")
 
     actual = includes(umbrella)
-    found += [f"{name} is said to be included, and is not" for name, _ in included if name not in actual]
+    found += [
+        f"{name} is said to be included, and is not" for name, _ in included if name not in actual and name[-1] != "/"
+    ]
     found += [f"{name} is included, and is said not to be" for name in actual if name not in dict(included)]
     everything: set[str] = set()
     for name in actual:

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Writes python/sigmaik/_core.pyi from the module installed in .venv, or with --check compares the two.
+# Writes python/sigmaik/_core.pyi and _rules.py from the module installed in .venv, or with --check compares them.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 out=build/stubs
@@ -16,11 +16,20 @@ sed -zEi '
 # Both files in sections by topic: the order in which branches were merged makes no difference.
 .venv/bin/python tools/stub_sections.py "$out/sigmaik/_core.pyi" python/sigmaik/_core.pyi
 
-if [[ ${1:-} == --check ]]; then
-  if ! diff -u python/sigmaik/_core.pyi "$out/sigmaik/_core.pyi"; then
-    echo "python/sigmaik/_core.pyi is not what the module says: run make stubs, and commit it" >&2
+.venv/bin/python - > "$out/sigmaik/_rules.py" <<'EOF'
+from sigmaik import _core
+
+names = sorted((rule.__name__ for rule in _core.rules()), key=str.casefold)
+print('"""The classes of the rules, as sigmaik::Rules lists them. Written by `make stubs`."""\n')
+print("from ._core import (", *(f"    {name}," for name in names), ")", "", sep="\n")
+print("__all__ = [", *(f'    "{name}",' for name in names), "]", sep="\n")
+EOF
+
+for file in _core.pyi _rules.py; do
+  if [[ ${1:-} != --check ]]; then
+    cp "$out/sigmaik/$file" "python/sigmaik/$file"
+  elif ! diff -u "python/sigmaik/$file" "$out/sigmaik/$file"; then
+    echo "python/sigmaik/$file is not what the module says: run make stubs, and commit it" >&2
     exit 1
   fi
-else
-  cp "$out/sigmaik/_core.pyi" python/sigmaik/_core.pyi
-fi
+done

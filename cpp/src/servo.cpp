@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <type_traits>
 #include <utility>
 
 #include <sigmaik/pose.hpp>
@@ -33,16 +32,6 @@ void check_joints(const char* what, const JointRef& values, const Chain& chain) 
     require(std::isfinite(values[i]), what, " of joint '", chain.joint_names()[static_cast<std::size_t>(i)],
             "' is not finite");
   }
-}
-
-// Below this part of σ_max the rule treats a direction as singular.
-double threshold(const Method& method) noexcept {
-  return std::visit(
-      [](const auto& rule) {
-        if constexpr (requires { rule.gamma; }) return rule.gamma;
-        return 0.1;
-      },
-      method);
 }
 
 // What redistribution weighs joint motion with, against twist: of σ_max. It bounds how fast joints move to make up for
@@ -298,7 +287,7 @@ void Servo::limit(ServoStep& step) noexcept {
 
 JointVector Servo::redistribute(const JointVector& qdot, const VelocityBounds& bounds, ServoStep& step) noexcept {
   const Spectrum& spectrum = solver_.spectrum();
-  const double largest = spectrum.sigma(0), regular = threshold(solver_.method());
+  const double largest = spectrum.sigma(0), regular = relative_threshold(solver_.method());
   rows_.setZero(spectrum.size(), chain_.dof());
   if (options_.exact == std::array<bool, 6>{}) {
     for (int i = 0; i < spectrum.size(); ++i) {

@@ -10,6 +10,10 @@
 namespace sigmaik {
 namespace {
 
+// Part of the command that the answer may miss and still be exact.
+constexpr double kExact = 1e-9;
+
+// The answer to what cannot be solved: no motion, BadInput.
 Solution refuse(const TaskJacobianRef& jacobian) noexcept {
   Solution s;
   const auto m = std::min<Eigen::Index>(jacobian.rows(), kMaxTask);
@@ -38,6 +42,19 @@ TaskVector product(const TaskJacobianRef& jacobian, const JointVector& qdot) noe
   return sum;
 }
 
+// Bit i: row i of the task is angular.
+std::uint8_t angular_rows(const Task& task) noexcept {
+  if (task.rows() == 6) return 0b111000;
+  std::uint8_t angular = 0;
+  int row = 0;
+  for (unsigned i = 0; i < 6; ++i) {
+    if (!task.mask[i]) continue;
+    if (i >= 3) angular |= static_cast<std::uint8_t>(1u << row);
+    ++row;
+  }
+  return angular;
+}
+
 }  // namespace
 
 int Solution::singular_count() const noexcept { return std::popcount(singular); }
@@ -57,82 +74,86 @@ void VelocitySolver::set_method(const Method& method) {
 
 Solution VelocitySolver::solve(const TaskJacobianRef& jacobian, const TaskRef& twist, const JointRef& posture,
                                const Eigen::Matrix3d& rotation) noexcept {
+  if (!checked(jacobian, twist, posture, rotation)) return refuse(jacobian);
+  const Question question{jacobian, twist, posture, rotation, angular_rows(task_), selects(jacobian)};
+  TaskVector command = twist;
+  if (!weighted(question, command)) return refuse(jacobian);
+  return answer(question, command, sigmaik::resolve(method_, spectrum_, command, question.angular));
+}
+
+bool VelocitySolver::selects(const TaskJacobianRef& jacobian) const noexcept {
+  return jacobian.rows() == 6 && !(task_.rows() == 6 && task_.frame == Frame::Base);
+}
+
+bool VelocitySolver::checked(const TaskJacobianRef& jacobian, const TaskRef& twist, const JointRef& posture,
+                             const Eigen::Matrix3d& rotation) const noexcept {
   const auto m = jacobian.rows(), n = jacobian.cols();
   const int asked = task_.rows();
-  const bool select = m == 6 && !(asked == 6 && task_.frame == Frame::Base);
-  if (m < 1 || m > kMaxTask || n < 1 || n > kMaxJoints || twist.size() != m ||
-      (posture.size() != 0 && posture.size() != n) || (m != 6 && asked != 6 && m != asked) || !finite(jacobian) ||
-      !finite(twist) || !finite(posture) || (select && task_.frame == Frame::Tool && !rotation.allFinite())) {
-    return refuse(jacobian);
-  }
+  const bool sizes = m >= 1 && m <= kMaxTask && n >= 1 && n <= kMaxJoints && twist.size() == m &&
+                     (posture.size() == 0 || posture.size() == n) && (m == 6 || asked == 6 || m == asked);
+  const bool turned = task_.frame == Frame::Tool && selects(jacobian);
+  return sizes && finite(jacobian) && finite(twist) && finite(posture) && (!turned || rotation.allFinite());
+}
 
-  std::uint8_t angular = 0;  // bit i: row i of the task is angular
-  if (asked == 6) {
-    angular = 0b111000;
-  } else {
-    int row = 0;
-    for (unsigned i = 0; i < 6; ++i) {
-      if (!task_.mask[i]) continue;
-      if (i >= 3) angular |= static_cast<std::uint8_t>(1u << row);
-      ++row;
-    }
+bool VelocitySolver::weighted(const Question& question, TaskVector& command) noexcept {
+  if (!question.select && length_scale_ == 1.0) {
+    spectrum_.decompose(question.jacobian);
+    return true;
   }
-  TaskVector command = twist;
-  if (select || length_scale_ != 1.0) {
-    TaskJacobian rows = jacobian;
-    if (select) {
-      rows = select_rows(task_, rotation, Jacobian(jacobian));
-      command = select_rows(task_, rotation, Twist(twist));
-    }
-    for (int row = 0; row < rows.rows(); ++row) {
-      if ((angular >> row & 1u) == 0) continue;
-      rows.row(row) *= length_scale_;
-      command[row] *= length_scale_;
-    }
-    if (!rows.allFinite() || !command.allFinite()) return refuse(jacobian);
-    spectrum_.decompose(rows);
-  } else {
-    spectrum_.decompose(jacobian);
+  TaskJacobian rows = question.jacobian;
+  if (question.select) {
+    rows = select_rows(task_, question.rotation, Jacobian(question.jacobian));
+    command = select_rows(task_, question.rotation, Twist(question.twist));
   }
-  Resolution resolution = sigmaik::resolve(method_, spectrum_, command, angular);
+  for (int row = 0; row < rows.rows(); ++row) {
+    if ((question.angular >> row & 1u) == 0) continue;
+    rows.row(row) *= length_scale_;
+    command[row] *= length_scale_;
+  }
+  if (!rows.allFinite() || !command.allFinite()) return false;
+  spectrum_.decompose(rows);
+  return true;
+}
 
+Solution VelocitySolver::answer(const Question& question, const TaskVector& command,
+                                Resolution resolution) const noexcept {
   Solution s;
-  bool exact = resolution.exact;
-  double enough = command.cwiseAbs().maxCoeff();  // what the answer may miss of the command and be exact, times 1e9
-  if (posture.size() != 0) {
-    enough = std::max(enough, spectrum_.sigma(0) * posture.cwiseAbs().maxCoeff());
-    const std::array<double, kMaxTask> along = spectrum_.along_v(posture);
+  double largest = command.cwiseAbs().maxCoeff();  // of the command and of what the posture asks for
+  if (question.posture.size() != 0) {
+    largest = std::max(largest, spectrum_.sigma(0) * question.posture.cwiseAbs().maxCoeff());
+    const std::array<double, kMaxTask> along = spectrum_.along_v(question.posture);
     for (std::size_t i = 0; i < along.size(); ++i) resolution.speed[i] -= resolution.projector[i] * along[i];
-    s.qdot = posture + spectrum_.combine_v(resolution.speed);
+    s.qdot = question.posture + spectrum_.combine_v(resolution.speed);
   } else {
     s.qdot = spectrum_.combine_v(resolution.speed);
   }
-  s.achieved_twist = product(jacobian, s.qdot);
+  s.achieved_twist = product(question.jacobian, s.qdot);
   if (!finite(s.qdot) || !finite(s.achieved_twist) || !std::isfinite(spectrum_.sigma(0))) {
-    return refuse(jacobian);  // too large for numbers
+    return refuse(question.jacobian);  // the answer overflows
   }
 
-  if (exact) {
-    // The rule is; but a posture that its projector lets through moves the tip, and so does rounding of large speeds.
-    TaskVector missed = s.achieved_twist - twist;
-    if (select) missed = select_rows(task_, rotation, Twist(missed));
-    double most = 0.0;
-    for (int row = 0; row < missed.size(); ++row) {
-      most = std::max(most, std::abs((angular >> row & 1u) != 0 ? missed[row] * length_scale_ : missed[row]));
-    }
-    exact = most <= 1e-9 * enough;
-  }
-  s.status = exact ? Status::Ok : Status::Damped;
+  s.status = resolution.exact && exact(question, s.achieved_twist, kExact * largest) ? Status::Ok : Status::Damped;
   s.singular = resolution.singular;
   s.singular_values.resize(spectrum_.size());
   for (int i = 0; i < spectrum_.size(); ++i) s.singular_values[i] = spectrum_.sigma(i);
-  if (m == 6 && !select) {
+  if (question.jacobian.rows() == 6 && !question.select) {
     s.directions = spectrum_.basis<6>();
   } else {
     s.directions.resize(spectrum_.rows(), spectrum_.rows());
     for (int i = 0; i < spectrum_.rows(); ++i) s.directions.col(i) = spectrum_.u(i);
   }
   return s;
+}
+
+// An exact rule is not enough: a posture that its projector lets through moves the tip, and large speeds round.
+bool VelocitySolver::exact(const Question& question, const TaskVector& achieved, double tolerance) const noexcept {
+  TaskVector missed = achieved - question.twist;
+  if (question.select) missed = select_rows(task_, question.rotation, Twist(missed));
+  double most = 0.0;
+  for (int row = 0; row < missed.size(); ++row) {
+    most = std::max(most, std::abs((question.angular >> row & 1u) != 0 ? missed[row] * length_scale_ : missed[row]));
+  }
+  return most <= tolerance;
 }
 
 }  // namespace sigmaik

@@ -11,9 +11,8 @@
 Units are m, rad, s, N·m. Twists and Jacobians are [v; ω], in base axes, at the tip's origin.
 """
 
-from . import indices, methods, planning, robots, sim, singularities
+from . import _rules, indices, methods, planning, robots, sim, singularities
 from ._core import (
-    AdaptiveDampedLeastSquares,
     AnalyticBranch,
     AnalyticIk,
     ArgumentError,
@@ -22,23 +21,17 @@ from ._core import (
     ComputedTorqueStep,
     ConstrainedIk,
     ConstrainedIkStep,
-    DampedLeastSquares,
     Dynamics,
     Error,
     Inertia,
-    JacobianProjection,
-    JacobianSafety,
-    JacobianSafetyProjection,
     JointLimits,
-    JParse,
     LeastSquaresSolution,
     LoopCommand,
     LoopStatistics,
-    PseudoInverse,
+    Method,
     SampleCounts,
     SampleStatus,
     Segment,
-    SelectivelyDampedLeastSquares,
     Servo,
     ServoLoop,
     ServoStep,
@@ -56,9 +49,9 @@ from ._core import (
     rotation_log,
     solve_batch,
 )
+from ._rules import *  # noqa: F403  # the rules' classes
 
 __all__ = [
-    "AdaptiveDampedLeastSquares",
     "AnalyticBranch",
     "AnalyticIk",
     "ArgumentError",
@@ -67,23 +60,17 @@ __all__ = [
     "ComputedTorqueStep",
     "ConstrainedIk",
     "ConstrainedIkStep",
-    "DampedLeastSquares",
     "Dynamics",
     "Error",
     "Inertia",
-    "JParse",
-    "JacobianProjection",
-    "JacobianSafety",
-    "JacobianSafetyProjection",
     "JointLimits",
     "LeastSquaresSolution",
     "LoopCommand",
     "LoopStatistics",
-    "PseudoInverse",
+    "Method",
     "SampleCounts",
     "SampleStatus",
     "Segment",
-    "SelectivelyDampedLeastSquares",
     "Servo",
     "ServoLoop",
     "ServoStep",
@@ -107,3 +94,4 @@ __all__ = [
     "singularities",
     "solve_batch",
 ]
+__all__ += _rules.__all__

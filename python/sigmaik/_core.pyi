@@ -7,7 +7,7 @@ import enum
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['AdaptiveDampedLeastSquares', 'AnalyticBranch', 'AnalyticIk', 'ArgumentError', 'ArmSpheres', 'CartError', 'CartLaw', 'CartRegion', 'Chain', 'ComputedTorque', 'ComputedTorqueStep', 'ConstrainedIk', 'ConstrainedIkStep', 'DEFAULT_SCALE', 'DampedLeastSquares', 'DistanceField', 'Dynamics', 'Error', 'Inertia', 'JParse', 'JacobianProjection', 'JacobianSafety', 'JacobianSafetyProjection', 'JointCost', 'JointLimits', 'LeastSquaresSolution', 'LoopCommand', 'LoopStatistics', 'PlaneCartLaw', 'PseudoInverse', 'SampleCounts', 'SampleStatus', 'Segment', 'SelectivelyDampedLeastSquares', 'Servo', 'ServoLoop', 'ServoStep', 'SingularSets', 'Solution', 'Spectrum', 'Status', 'StreamStatus', 'SupportPlanner', 'SupportStates', 'Target', 'TargetStream', 'TimeOptimal', 'TimeOptimalResult', 'VelocitySolver', 'cart_descent', 'cart_law', 'collision_cost', 'evaluate_index', 'forbidden_intervals', 'geometry_aware_cost', 'index_of_jacobian', 'joint_limit_cost', 'known_singular_sets', 'least_squares', 'load_singular_sets', 'log_manipulability_cost', 'manipulability_cost', 'min_distance', 'plane_cart_law', 'pose_error', 'potential_cost', 'reference_scale', 'rotation_exp', 'rotation_log', 'self_collision_cost', 'self_collision_pairs', 'singular_sets_of', 'solve_batch', 'spline_velocities', 'sum_of_costs', 'taut_string']
+__all__: list[str] = ['AdaptiveDampedLeastSquares', 'AnalyticBranch', 'AnalyticIk', 'ArgumentError', 'ArmSpheres', 'CartError', 'CartLaw', 'CartRegion', 'Chain', 'ComputedTorque', 'ComputedTorqueStep', 'ConstrainedIk', 'ConstrainedIkStep', 'DEFAULT_SCALE', 'DampedLeastSquares', 'DistanceField', 'Dynamics', 'Error', 'Inertia', 'JParse', 'JacobianProjection', 'JacobianSafety', 'JacobianSafetyProjection', 'JointCost', 'JointLimits', 'LeastSquaresSolution', 'LoopCommand', 'LoopStatistics', 'Method', 'PlaneCartLaw', 'PseudoInverse', 'SampleCounts', 'SampleStatus', 'Segment', 'SelectivelyDampedLeastSquares', 'Servo', 'ServoLoop', 'ServoStep', 'SingularSets', 'Solution', 'Spectrum', 'Status', 'StreamStatus', 'SupportPlanner', 'SupportStates', 'Target', 'TargetStream', 'TimeOptimal', 'TimeOptimalResult', 'VelocitySolver', 'cart_descent', 'cart_law', 'collision_cost', 'evaluate_index', 'forbidden_intervals', 'geometry_aware_cost', 'index_of_jacobian', 'joint_limit_cost', 'known_singular_sets', 'least_squares', 'load_singular_sets', 'log_manipulability_cost', 'manipulability_cost', 'min_distance', 'plane_cart_law', 'pose_error', 'potential_cost', 'reference_scale', 'rotation_exp', 'rotation_log', 'rules', 'self_collision_cost', 'self_collision_pairs', 'singular_sets_of', 'solve_batch', 'spline_velocities', 'sum_of_costs', 'taut_string']
 class Error(ValueError):
     """
     What set-up and checked calls refuse. The text carries the facts.
@@ -269,205 +269,206 @@ class AnalyticIk:
         """
         The arm.
         """
-class PseudoInverse:
+class Method:
     """
-    Moore and Penrose's inverse, truncated: u_iᵀẋ/σ_i, and 0 where σ_i ≤ tolerance·σ_max.
+    A rule with its parameters: what a method does with each singular direction. The base class of all of them.
 
-    Exact, but joint speeds grow as 1/σ_i towards a singularity.
+    Wherever a method is an argument, its name is accepted too: "jparse:gamma=0.2", see sigmaik.methods.
     """
+    short_name: typing.ClassVar[str] = ''
+    title: typing.ClassVar[str] = ''
     def __eq__(self, arg0: typing.Any) -> bool:
         ...
     def __hash__(self) -> int:
         ...
-    def __init__(self, tolerance: typing.SupportsFloat | typing.SupportsIndex = 1e-12) -> None:
-        """
-        tolerance: fraction of σ_max in (0, 1] at and below which directions are dropped.
-        """
     def __reduce__(self) -> tuple[typing.Any, tuple[typing.Any, ...]]:
         ...
     def __repr__(self) -> str:
         ...
     @property
-    def tolerance(self) -> float:
-        ...
-class DampedLeastSquares:
-    """
-    Constant damping: σ_i/(σ_i²+λ²) u_iᵀẋ (Wampler 1986; Nakamura and Hanafusa 1986).
-
-    Smooth, and inexact everywhere by λ²/(σ_i²+λ²). |q̇| ≤ |ẋ|/(2λ).
-    """
-    def __eq__(self, arg0: typing.Any) -> bool:
-        ...
-    def __hash__(self) -> int:
-        ...
-    def __init__(self, damping: typing.SupportsFloat | typing.SupportsIndex = 0.1) -> None:
+    def parameters(self) -> dict[str, typing.Any]:
         """
-        damping: λ > 0, in the units of σ.
+        The constructor's arguments by name.
         """
-    def __reduce__(self) -> tuple[typing.Any, tuple[typing.Any, ...]]:
-        ...
-    def __repr__(self) -> str:
-        ...
-    @property
-    def damping(self) -> float:
-        ...
-class AdaptiveDampedLeastSquares:
-    """
-    Damping that grows towards a singularity and vanishes away from it. λ is `damping`, ε or w₀ `threshold`.
-
-    rule 'numerical_filtering': only directions with σ_i < ε, λ_i² = (1 − (σ_i/ε)²) λ² (Maciejewski and Klein
-        1988, as in Chiaverini 1997; continuous too where several directions are small)
-    rule 'manipulability': all directions, λ² (1 − w/w₀)² where w = Π σ_i < w₀ (Nakamura and Hanafusa 1986)
-    rule 'smallest_singular_value': all directions, (1 − (σ_min/ε)²) λ² where σ_min < ε (Chiaverini 1997)
-    """
-    def __eq__(self, arg0: typing.Any) -> bool:
-        ...
-    def __hash__(self) -> int:
-        ...
-    def __init__(self, rule: str = 'numerical_filtering', damping: typing.SupportsFloat | typing.SupportsIndex = 0.1, threshold: typing.SupportsFloat | typing.SupportsIndex | None = None, relative: bool = True) -> None:
-        """
-        damping: λ > 0 at the singularity. threshold: > 0; by default 0.1, or 1e-3 for 'manipulability'.
-        relative: λ and ε are fractions of σ_max, w₀ of σ_max to the number of directions, so that units and size
-        of the arm do not matter; False: absolute values, as in the papers.
-        """
-    def __reduce__(self) -> tuple[typing.Any, tuple[typing.Any, ...]]:
-        ...
-    def __repr__(self) -> str:
-        ...
-    @property
-    def damping(self) -> float:
-        ...
-    @property
-    def relative(self) -> bool:
-        ...
-    @property
-    def rule(self) -> str:
-        ...
-    @property
-    def threshold(self) -> float | None:
-        ...
-class SelectivelyDampedLeastSquares:
-    """
-    Each direction clamped by what it moves the joints for what it moves the tip (Buss and Kim 2005).
-
-    Their angle limit per update is a joint speed here. |q̇_j| ≤ max_speed.
-    """
-    def __eq__(self, arg0: typing.Any) -> bool:
-        ...
-    def __hash__(self) -> int:
-        ...
-    def __init__(self, max_speed: typing.SupportsFloat | typing.SupportsIndex = 0.7853981633974483) -> None:
-        """
-        max_speed: [rad/s] > 0 (the paper's γ_max).
-        """
-    def __reduce__(self) -> tuple[typing.Any, tuple[typing.Any, ...]]:
-        ...
-    def __repr__(self) -> str:
-        ...
-    @property
-    def max_speed(self) -> float:
-        ...
-class JParse:
+class JParse(Method):
     """
     J-PARSE (Guptasarma et al.): u_iᵀẋ/σ_i where σ_i > γσ_max, else σ_i/(γσ_max)² u_iᵀKẋ.
 
     Regular directions are exact; along a singular one motion fades out at the singularity and can leave it
     again. |q̇| ≤ |ẋ|/(γσ_max) for unit gains.
     """
-    def __eq__(self, arg0: typing.Any) -> bool:
-        ...
-    def __hash__(self) -> int:
-        ...
+    short_name: typing.ClassVar[str] = 'jparse'
+    title: typing.ClassVar[str] = 'J-PARSE'
     def __init__(self, gamma: typing.SupportsFloat | typing.SupportsIndex = 0.1, gain_linear: typing.SupportsFloat | typing.SupportsIndex = 1.0, gain_angular: typing.SupportsFloat | typing.SupportsIndex = 1.0, continuous: bool = True, singular_posture: bool = False) -> None:
         """
         gamma: threshold in (0, 1] on σ_i/σ_max.
-        gain_linear, gain_angular: the paper's K ≥ 0, for the command's linear and angular rows.
-        continuous: the gain is K at σ_i = 0 and goes linearly to 1 at the threshold; False: K throughout, as
-        published, which jumps at the threshold where K ≠ 1.
-        singular_posture: the posture acts along singular directions, as far as J-PARSE's own inverse does not, by its
-        I − J⁺J: an arm that was stretched out folds back to the side of its posture. False: it does not, as published.
+        gain_linear: the paper's K ≥ 0, for the command's linear rows.
+        gain_angular: the paper's K ≥ 0, for the command's angular rows.
+        continuous: the gain is K at σ_i = 0 and goes linearly to 1 at the threshold; False: K throughout,
+            as published, which jumps at the threshold where K ≠ 1.
+        singular_posture: the posture acts along singular directions, as far as J-PARSE's own inverse does
+            not, by its I − J⁺J: an arm that was stretched out folds back to the side of its posture. False:
+            the posture does not act there, as published.
         """
-    def __reduce__(self) -> tuple[typing.Any, tuple[typing.Any, ...]]:
-        ...
-    def __repr__(self) -> str:
-        ...
     @property
     def continuous(self) -> bool:
-        ...
+        """
+        the gain is K at σ_i = 0 and goes linearly to 1 at the threshold; False: K throughout, as published, which jumps at the threshold where K ≠ 1.
+        """
     @property
     def gain_angular(self) -> float:
-        ...
+        """
+        the paper's K ≥ 0, for the command's angular rows.
+        """
     @property
     def gain_linear(self) -> float:
-        ...
+        """
+        the paper's K ≥ 0, for the command's linear rows.
+        """
     @property
     def gamma(self) -> float:
-        ...
+        """
+        threshold in (0, 1] on σ_i/σ_max.
+        """
     @property
     def singular_posture(self) -> bool:
-        ...
-class JacobianProjection:
+        """
+        the posture acts along singular directions, as far as J-PARSE's own inverse does not, by its I − J⁺J: an arm that was stretched out folds back to the side of its posture. False: the posture does not act there, as published.
+        """
+class PseudoInverse(Method):
+    """
+    Moore and Penrose's inverse, truncated: u_iᵀẋ/σ_i, and 0 where σ_i ≤ tolerance·σ_max.
+
+    The answer is exact, but joint speeds grow as 1/σ_i towards a singularity.
+    """
+    short_name: typing.ClassVar[str] = 'pinv'
+    title: typing.ClassVar[str] = 'pseudo-inverse'
+    def __init__(self, tolerance: typing.SupportsFloat | typing.SupportsIndex = 1e-12) -> None:
+        """
+        tolerance: fraction of σ_max in (0, 1] at and below which directions are dropped.
+        """
+    @property
+    def tolerance(self) -> float:
+        """
+        fraction of σ_max in (0, 1] at and below which directions are dropped.
+        """
+class DampedLeastSquares(Method):
+    """
+    Constant damping: σ_i/(σ_i²+λ²) u_iᵀẋ (Wampler 1986; Nakamura and Hanafusa 1986).
+
+    The answer is smooth, and inexact everywhere by λ²/(σ_i²+λ²). |q̇| ≤ |ẋ|/(2λ).
+    """
+    short_name: typing.ClassVar[str] = 'dls'
+    title: typing.ClassVar[str] = 'damped least squares'
+    def __init__(self, damping: typing.SupportsFloat | typing.SupportsIndex = 0.1) -> None:
+        """
+        damping: λ > 0, in the units of σ.
+        """
+    @property
+    def damping(self) -> float:
+        """
+        λ > 0, in the units of σ.
+        """
+class AdaptiveDampedLeastSquares(Method):
+    """
+    Damping that grows towards a singularity and vanishes away from it. λ is `damping`, ε or w₀ `threshold`.
+
+    rule 'numerical_filtering': only directions with σ_i < ε, λ_i² = (1 − (σ_i/ε)²) λ² (Maciejewski and Klein
+        1988, as in Chiaverini 1997; the answer is continuous too where several directions are small)
+    rule 'manipulability': all directions, λ² (1 − w/w₀)² where w = Π σ_i < w₀ (Nakamura and Hanafusa 1986)
+    rule 'smallest_singular_value': all directions, (1 − (σ_min/ε)²) λ² where σ_min < ε (Chiaverini 1997)
+    """
+    short_name: typing.ClassVar[str] = 'adaptive-dls'
+    title: typing.ClassVar[str] = 'adaptive damped least squares'
+    def __init__(self, rule: typing.Literal['numerical_filtering', 'manipulability', 'smallest_singular_value'] = 'numerical_filtering', damping: typing.SupportsFloat | typing.SupportsIndex = 0.1, threshold: typing.SupportsFloat | typing.SupportsIndex | None = None, relative: bool = True) -> None:
+        """
+        rule: how the distance to a singularity is measured.
+        damping: λ > 0 at the singularity.
+        threshold: > 0; by default 0.1, or 1e-3 for 'manipulability'.
+        relative: λ and ε are fractions of σ_max, w₀ of σ_max to the number of directions, so that units and
+            size of the arm do not matter; False: absolute values, as in the papers.
+        """
+    @property
+    def damping(self) -> float:
+        """
+        λ > 0 at the singularity.
+        """
+    @property
+    def relative(self) -> bool:
+        """
+        λ and ε are fractions of σ_max, w₀ of σ_max to the number of directions, so that units and size of the arm do not matter; False: absolute values, as in the papers.
+        """
+    @property
+    def rule(self) -> str:
+        """
+        how the distance to a singularity is measured.
+        """
+    @property
+    def threshold(self) -> float | None:
+        """
+        > 0; by default 0.1, or 1e-3 for 'manipulability'.
+        """
+class SelectivelyDampedLeastSquares(Method):
+    """
+    Each direction clamped by what it moves the joints for what it moves the tip (Buss and Kim 2005).
+
+    Their angle limit per update is a joint speed here. |q̇_j| ≤ max_speed.
+    """
+    short_name: typing.ClassVar[str] = 'sdls'
+    title: typing.ClassVar[str] = 'selectively damped least squares'
+    def __init__(self, max_speed: typing.SupportsFloat | typing.SupportsIndex = 0.7853981633974483) -> None:
+        """
+        max_speed: [rad/s] > 0 (the paper's γ_max).
+        """
+    @property
+    def max_speed(self) -> float:
+        """
+        [rad/s] > 0 (the paper's γ_max).
+        """
+class JacobianProjection(Method):
     """
     Ablation of J-PARSE (eq. 62): u_iᵀẋ/σ_i where σ_i > γσ_max, else 0; the posture acts in the directions that are left out.
     """
-    def __eq__(self, arg0: typing.Any) -> bool:
-        ...
-    def __hash__(self) -> int:
-        ...
+    short_name: typing.ClassVar[str] = 'projection'
+    title: typing.ClassVar[str] = 'ablation: projection'
     def __init__(self, gamma: typing.SupportsFloat | typing.SupportsIndex = 0.1) -> None:
         """
         gamma: threshold in (0, 1] on σ_i/σ_max.
         """
-    def __reduce__(self) -> tuple[typing.Any, tuple[typing.Any, ...]]:
-        ...
-    def __repr__(self) -> str:
-        ...
     @property
     def gamma(self) -> float:
         """
-        Threshold on σ_i/σ_max.
+        threshold in (0, 1] on σ_i/σ_max.
         """
-class JacobianSafety:
+class JacobianSafety(Method):
     """
     Ablation of J-PARSE (eq. 63): u_iᵀẋ/max(σ_i, γσ_max).
     """
-    def __eq__(self, arg0: typing.Any) -> bool:
-        ...
-    def __hash__(self) -> int:
-        ...
+    short_name: typing.ClassVar[str] = 'safety'
+    title: typing.ClassVar[str] = 'ablation: safety'
     def __init__(self, gamma: typing.SupportsFloat | typing.SupportsIndex = 0.1) -> None:
         """
         gamma: threshold in (0, 1] on σ_i/σ_max.
         """
-    def __reduce__(self) -> tuple[typing.Any, tuple[typing.Any, ...]]:
-        ...
-    def __repr__(self) -> str:
-        ...
     @property
     def gamma(self) -> float:
         """
-        Threshold on σ_i/σ_max.
+        threshold in (0, 1] on σ_i/σ_max.
         """
-class JacobianSafetyProjection:
+class JacobianSafetyProjection(Method):
     """
     Ablation of J-PARSE (eq. 64): like JacobianProjection, but the posture does not act in the directions that are left out.
     """
-    def __eq__(self, arg0: typing.Any) -> bool:
-        ...
-    def __hash__(self) -> int:
-        ...
+    short_name: typing.ClassVar[str] = 'safety-projection'
+    title: typing.ClassVar[str] = 'ablation: safety projection'
     def __init__(self, gamma: typing.SupportsFloat | typing.SupportsIndex = 0.1) -> None:
         """
         gamma: threshold in (0, 1] on σ_i/σ_max.
         """
-    def __reduce__(self) -> tuple[typing.Any, tuple[typing.Any, ...]]:
-        ...
-    def __repr__(self) -> str:
-        ...
     @property
     def gamma(self) -> float:
         """
-        Threshold on σ_i/σ_max.
+        threshold in (0, 1] on σ_i/σ_max.
         """
 class Spectrum:
     """
@@ -532,7 +533,7 @@ class VelocitySolver:
     """
     Resolves twists at given Jacobians by one method. Keeps only a warm start.
     """
-    def __init__(self, method: PseudoInverse | DampedLeastSquares | AdaptiveDampedLeastSquares | SelectivelyDampedLeastSquares | JParse | JacobianProjection | JacobianSafety | JacobianSafetyProjection, length_scale: typing.SupportsFloat | typing.SupportsIndex = 1.0, mask: numpy.typing.ArrayLike | None = None, frame: str = 'base') -> None:
+    def __init__(self, method: Method | str, length_scale: typing.SupportsFloat | typing.SupportsIndex = 1.0, mask: numpy.typing.ArrayLike | None = None, frame: str = 'base') -> None:
         """
         length_scale: [m] > 0; 1 rad/s weighs as much as length_scale m/s. In proportion to the arm, it makes
             answers independent of units and size.
@@ -561,12 +562,12 @@ class VelocitySolver:
         [m]
         """
     @property
-    def method(self) -> PseudoInverse | DampedLeastSquares | AdaptiveDampedLeastSquares | SelectivelyDampedLeastSquares | JParse | JacobianProjection | JacobianSafety | JacobianSafetyProjection:
+    def method(self) -> Method:
         """
         The rule; may be changed.
         """
     @method.setter
-    def method(self, arg1: PseudoInverse | DampedLeastSquares | AdaptiveDampedLeastSquares | SelectivelyDampedLeastSquares | JParse | JacobianProjection | JacobianSafety | JacobianSafetyProjection) -> None:
+    def method(self, arg1: Method | str) -> None:
         ...
 class ServoStep:
     """
@@ -631,7 +632,7 @@ class Servo:
     It integrates its own command (q ← q + q̇ dt) and reads no measured positions. Every command holds
     the chain's limits and leaves room to go on holding them; a start outside them comes back.
     """
-    def __init__(self, chain: Chain, method: PseudoInverse | DampedLeastSquares | AdaptiveDampedLeastSquares | SelectivelyDampedLeastSquares | JParse | JacobianProjection | JacobianSafety | JacobianSafetyProjection, dt: typing.SupportsFloat | typing.SupportsIndex = 0.001, *, gain_linear: typing.SupportsFloat | typing.SupportsIndex = 5.0, gain_angular: typing.SupportsFloat | typing.SupportsIndex = 5.0, max_linear_error: typing.SupportsFloat | typing.SupportsIndex = 0.25, max_angular_error: typing.SupportsFloat | typing.SupportsIndex = 1.0, soft_start: typing.SupportsFloat | typing.SupportsIndex = 0.1, posture: numpy.typing.ArrayLike | None = None, posture_gain: typing.SupportsFloat | typing.SupportsIndex = 0.0, posture_max_speed: typing.SupportsFloat | typing.SupportsIndex = ..., avoid: typing.Literal['manipulability', 'potential'] | None = None, avoid_gain: typing.SupportsFloat | typing.SupportsIndex = 1.0, avoid_max_speed: typing.SupportsFloat | typing.SupportsIndex = 0.5, eta1: typing.SupportsFloat | typing.SupportsIndex = 0.0, eta2: typing.SupportsFloat | typing.SupportsIndex = 10.0, position_limits: bool = True, velocity_limits: bool = True, acceleration_limits: bool = True, jerk_limits: bool = True, recovery_speed: typing.SupportsFloat | typing.SupportsIndex = 0.1, on_limit: typing.Literal['redistribute', 'scale'] = 'redistribute', exact: numpy.typing.ArrayLike | None = (0, 0, 0, 0, 0, 0), length_scale: typing.SupportsFloat | typing.SupportsIndex = 1.0, mask: numpy.typing.ArrayLike | None = (1, 1, 1, 1, 1, 1), frame: typing.Literal['base', 'tool'] = 'base') -> None:
+    def __init__(self, chain: Chain, method: Method | str, dt: typing.SupportsFloat | typing.SupportsIndex = 0.001, *, gain_linear: typing.SupportsFloat | typing.SupportsIndex = 5.0, gain_angular: typing.SupportsFloat | typing.SupportsIndex = 5.0, max_linear_error: typing.SupportsFloat | typing.SupportsIndex = 0.25, max_angular_error: typing.SupportsFloat | typing.SupportsIndex = 1.0, soft_start: typing.SupportsFloat | typing.SupportsIndex = 0.1, posture: numpy.typing.ArrayLike | None = None, posture_gain: typing.SupportsFloat | typing.SupportsIndex = 0.0, posture_max_speed: typing.SupportsFloat | typing.SupportsIndex = ..., avoid: typing.Literal['manipulability', 'potential'] | None = None, avoid_gain: typing.SupportsFloat | typing.SupportsIndex = 1.0, avoid_max_speed: typing.SupportsFloat | typing.SupportsIndex = 0.5, eta1: typing.SupportsFloat | typing.SupportsIndex = 0.0, eta2: typing.SupportsFloat | typing.SupportsIndex = 10.0, position_limits: bool = True, velocity_limits: bool = True, acceleration_limits: bool = True, jerk_limits: bool = True, recovery_speed: typing.SupportsFloat | typing.SupportsIndex = 0.1, on_limit: typing.Literal['redistribute', 'scale'] = 'redistribute', exact: numpy.typing.ArrayLike | None = (0, 0, 0, 0, 0, 0), length_scale: typing.SupportsFloat | typing.SupportsIndex = 1.0, mask: numpy.typing.ArrayLike | None = (1, 1, 1, 1, 1, 1), frame: typing.Literal['base', 'tool'] = 'base') -> None:
         """
         dt: [s] > 0, from one update to the next.
         gain_linear: [1/s] ≥ 0, from position error to velocity. (JParse's gain_linear is another thing: the
@@ -703,12 +704,12 @@ class Servo:
         [s]
         """
     @property
-    def method(self) -> PseudoInverse | DampedLeastSquares | AdaptiveDampedLeastSquares | SelectivelyDampedLeastSquares | JParse | JacobianProjection | JacobianSafety | JacobianSafetyProjection:
+    def method(self) -> Method:
         """
         The rule; may be changed between cycles.
         """
     @method.setter
-    def method(self, arg1: PseudoInverse | DampedLeastSquares | AdaptiveDampedLeastSquares | SelectivelyDampedLeastSquares | JParse | JacobianProjection | JacobianSafety | JacobianSafetyProjection) -> None:
+    def method(self, arg1: Method | str) -> None:
         ...
     @property
     def pose(self) -> numpy.typing.NDArray[numpy.float64]:
@@ -1709,6 +1710,10 @@ def rotation_log(rotation: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy
     """
     Axis times angle [rad] (3,) of a 3×3 rotation, angle in [0, π].
     """
+def rules() -> tuple[type[Method], ...]:
+    """
+    The class of every rule, in the order of lists and tables.
+    """
 def self_collision_cost(spheres: ArmSpheres, pairs: numpy.typing.ArrayLike | None = None, clearance: typing.SupportsFloat | typing.SupportsIndex = 0.02, weight: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> JointCost:
     """
     weight · Σ c(d) over pairs of spheres (P, 2), by default `self_collision_pairs(spheres, clearance)`;
@@ -1722,7 +1727,7 @@ def self_collision_pairs(spheres: ArmSpheres, clearance: typing.SupportsFloat | 
     """
 def singular_sets_of(chain: Chain) -> SingularSets | None:
     ...
-def solve_batch(method: PseudoInverse | DampedLeastSquares | AdaptiveDampedLeastSquares | SelectivelyDampedLeastSquares | JParse | JacobianProjection | JacobianSafety | JacobianSafetyProjection, J: numpy.typing.ArrayLike, twist: numpy.typing.ArrayLike, length_scale: typing.SupportsFloat | typing.SupportsIndex = 1.0, threads: typing.SupportsInt | typing.SupportsIndex = 1) -> numpy.typing.NDArray[numpy.float64]:
+def solve_batch(method: Method | str, J: numpy.typing.ArrayLike, twist: numpy.typing.ArrayLike, length_scale: typing.SupportsFloat | typing.SupportsIndex = 1.0, threads: typing.SupportsInt | typing.SupportsIndex = 1) -> numpy.typing.NDArray[numpy.float64]:
     """
     Joint velocities (B, n) for B independent problems, J (B, m, n) and twist (B, m), without the GIL.
 

@@ -9,26 +9,15 @@ A method's name is accepted as it stands wherever a method is: `sk.Servo(arm, "d
 from __future__ import annotations
 
 import difflib
-import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from . import _core
+from ._core import ArgumentError, Error, Method, rules
 
 __all__ = ["ALL", "TITLES", "Method", "NamedMethod", "parse", "parse_list", "parse_named"]
 
-Method: TypeAlias = (
-    _core.PseudoInverse
-    | _core.DampedLeastSquares
-    | _core.AdaptiveDampedLeastSquares
-    | _core.SelectivelyDampedLeastSquares
-    | _core.JParse
-    | _core.JacobianProjection
-    | _core.JacobianSafety
-    | _core.JacobianSafetyProjection
-)
-Value: TypeAlias = float | bool | str
+Value: TypeAlias = float | bool | str | None
 
 
 @dataclass(frozen=True)
@@ -45,39 +34,11 @@ class NamedMethod:
         return "".join(c if c.isalnum() or c in "-_." else "_" for c in self.label)
 
 
-@dataclass(frozen=True)
-class _Family:
-    title: str
-    make: Callable[..., Method]
-    parameters: Mapping[str, Value]  #: name to the library's default, which also fixes the type
-
-
-_GAMMA: dict[str, Value] = {"gamma": 0.1}
-_FAMILIES: dict[str, _Family] = {
-    "jparse": _Family(
-        "J-PARSE",
-        _core.JParse,
-        {"gamma": 0.1, "gain_linear": 1.0, "gain_angular": 1.0, "continuous": True, "singular_posture": False},
-    ),
-    "pinv": _Family("pseudo-inverse", _core.PseudoInverse, {"tolerance": 1e-12}),
-    "dls": _Family("damped least squares", _core.DampedLeastSquares, {"damping": 0.1}),
-    "adaptive-dls": _Family(
-        "adaptive damped least squares",
-        _core.AdaptiveDampedLeastSquares,
-        {"rule": "numerical_filtering", "damping": 0.1, "threshold": 0.1, "relative": True},
-    ),
-    "sdls": _Family(
-        "selectively damped least squares", _core.SelectivelyDampedLeastSquares, {"max_speed": math.pi / 4.0}
-    ),
-    "projection": _Family("ablation: projection", _core.JacobianProjection, _GAMMA),
-    "safety": _Family("ablation: safety", _core.JacobianSafety, _GAMMA),
-    "safety-projection": _Family("ablation: safety projection", _core.JacobianSafetyProjection, _GAMMA),
-}
-
+_CLASSES: dict[str, type[Method]] = {rule.short_name: rule for rule in rules()}
 #: Short names of all methods. In lists of methods, "all" stands for them.
-ALL: tuple[str, ...] = tuple(_FAMILIES)
+ALL: tuple[str, ...] = tuple(_CLASSES)
 #: Short name to what it stands for.
-TITLES: dict[str, str] = {name: family.title for name, family in _FAMILIES.items()}
+TITLES: dict[str, str] = {name: rule.title for name, rule in _CLASSES.items()}
 
 
 def parse(spec: str, defaults: Mapping[str, Value] | None = None) -> Method:
@@ -86,28 +47,29 @@ def parse(spec: str, defaults: Mapping[str, Value] | None = None) -> Method:
     Parameters that are not given come from `defaults`, where the method has a parameter of that name, then from the
     library. For jparse, gain=… sets gain_linear and gain_angular.
 
-    Raises ValueError where a name, a parameter or a value is wrong, with those that there are.
+    Raises ArgumentError (an Error and a TypeError) where there is no such method, Error (a ValueError) where a
+    parameter or a value is wrong; both say what there is.
     """
     name, _, arguments = spec.strip().partition(":")
-    family = _FAMILIES.get(name)
-    if family is None:
-        near = difflib.get_close_matches(name, ALL, n=1)
+    if name not in _CLASSES:
+        near = difflib.get_close_matches(name.lower(), ALL, n=1)
         hint = f"; did you mean '{near[0]}'?" if near else ""
-        raise ValueError(f"unknown method '{name}'; there are {', '.join(ALL)} and all{hint}")
-    values = {key: value for key, value in (defaults or {}).items() if key in family.parameters}
+        raise ArgumentError(f"unknown method '{name}'; there are {', '.join(ALL)}{hint}")
+    own = _CLASSES[name]().parameters
+    values = {key: value for key, value in (defaults or {}).items() if key in own}
     for item in filter(None, (part.strip() for part in arguments.split(","))):
         key, equals, text = (part.strip() for part in item.partition("="))
-        if key == "gain" and equals and "gain_linear" in family.parameters:
+        if key == "gain" and equals and "gain_linear" in own:
             values["gain_linear"] = values["gain_angular"] = _value(name, key, text, 1.0)
             continue
-        if key not in family.parameters or not equals:
-            known = ", ".join(f"{k}={_show(v)}" for k, v in family.parameters.items())
-            raise ValueError(f"method '{name}' has no parameter '{item}'; it has {known}")
-        values[key] = _value(name, key, text, family.parameters[key])
+        if key not in own or not equals:
+            known = ", ".join(f"{k}={_show(v)}" for k, v in own.items())
+            raise Error(f"method '{name}' has no parameter '{item}'; it has {known}")
+        values[key] = _value(name, key, text, own[key])
     try:
-        return family.make(**values)
-    except ValueError as error:
-        raise ValueError(f"method '{spec.strip()}': {error}") from None
+        return _CLASSES[name](**values)
+    except Error as error:
+        raise Error(f"method '{spec.strip()}': {error}") from None
 
 
 def parse_named(spec: str, defaults: Mapping[str, Value] | None = None) -> NamedMethod:
@@ -128,7 +90,7 @@ def parse_list(specs: Iterable[str], defaults: Mapping[str, Value] | None = None
             for single in ALL if spec == "all" else (spec,):
                 found.setdefault(single, parse_named(single, defaults))
     if not found:
-        raise ValueError("no method given")
+        raise Error("no method given")
     return list(found.values())
 
 
@@ -147,15 +109,17 @@ def _value(name: str, key: str, text: str, default: Value) -> Value:
     if isinstance(default, bool):
         known = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
         if text.lower() not in known:
-            raise ValueError(f"method '{name}': {key} is true or false, not '{text}'")
+            raise Error(f"method '{name}': {key} is true or false, not '{text}'")
         return known[text.lower()]
     if isinstance(default, str):
         return text
+    if default is None and text.lower() == "none":
+        return None
     try:
         return float(text)
     except ValueError:
-        raise ValueError(f"method '{name}': {key} is a number, not '{text}'") from None
+        raise Error(f"method '{name}': {key} is a number, not '{text}'") from None
 
 
 def _show(value: Value) -> str:
-    return str(value).lower() if isinstance(value, bool) else f"{value:g}" if isinstance(value, float) else value
+    return f"{value:g}" if isinstance(value, float) else str(value).lower()

@@ -8,27 +8,17 @@
 #include <sigmaik/error.hpp>
 #include <sigmaik/velocity_solver.hpp>
 
+#include "methods.hpp"
 #include "random.hpp"
 
 namespace {
 
 using namespace sigmaik;
+using test::all_methods;
 using test::MatrixXd;
 using test::Random;
 using test::VectorXd;
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-
-std::vector<Method> all_methods() {
-  return {PseudoInverse{},
-          DampedLeastSquares{},
-          AdaptiveDampedLeastSquares{},
-          SelectivelyDampedLeastSquares{},
-          JParse{},
-          JParse{0.2, 2.0, 0.5, false},
-          JacobianProjection{},
-          JacobianSafety{},
-          JacobianSafetyProjection{}};
-}
 
 struct Problem {
   BatchShape shape;

@@ -11,6 +11,7 @@
 #include <sigmaik/planning/costs.hpp>
 #include <sigmaik/sigmaik.hpp>
 
+#include "methods.hpp"
 #include "random.hpp"
 
 #if !defined(EIGEN_RUNTIME_NO_MALLOC) || defined(NDEBUG)
@@ -26,15 +27,7 @@ class NoMalloc {
   ~NoMalloc() { Eigen::internal::set_is_malloc_allowed(true); }
 };
 
-const sigmaik::Method kMethods[] = {sigmaik::PseudoInverse{},
-                                    sigmaik::DampedLeastSquares{},
-                                    sigmaik::AdaptiveDampedLeastSquares{},
-                                    sigmaik::AdaptiveDampedLeastSquares{sigmaik::DampingRule::Manipulability},
-                                    sigmaik::SelectivelyDampedLeastSquares{},
-                                    sigmaik::JParse{.gain_linear = 2.0},
-                                    sigmaik::JacobianProjection{},
-                                    sigmaik::JacobianSafety{},
-                                    sigmaik::JacobianSafetyProjection{}};
+const std::vector<sigmaik::Method> kMethods = test::all_methods();
 
 }  // namespace
 

@@ -7,8 +7,9 @@
 #include <string>
 
 #include <sigmaik/error.hpp>
-#include <sigmaik/inverse.hpp>
+#include <sigmaik/rules.hpp>
 
+#include "methods.hpp"
 #include "random.hpp"
 
 namespace {
@@ -22,21 +23,15 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr std::uint8_t kAngular = 0b111000;
 
+// The library's, and many more parameters.
 std::vector<Method> all_methods() {
-  std::vector<Method> out{PseudoInverse{},
-                          PseudoInverse{0.01},
-                          DampedLeastSquares{},
-                          DampedLeastSquares{0.8},
-                          SelectivelyDampedLeastSquares{},
-                          SelectivelyDampedLeastSquares{10.0},
-                          JParse{},
-                          JParse{0.3, 2.0, 0.5, true},
-                          JParse{0.3, 2.0, 0.5, false},
-                          JParse{0.3, 2.0, 0.5, true, true},
-                          JParse{1.0, 0.0, 3.0, true},
-                          JacobianProjection{},
-                          JacobianSafety{},
-                          JacobianSafetyProjection{0.2}};
+  std::vector<Method> out = test::library_methods();
+  for (const Method& method : std::initializer_list<Method>{
+           PseudoInverse{0.01}, DampedLeastSquares{0.8}, SelectivelyDampedLeastSquares{10.0},
+           JParse{0.3, 2.0, 0.5, true}, JParse{0.3, 2.0, 0.5, false}, JParse{0.3, 2.0, 0.5, true, true},
+           JParse{1.0, 0.0, 3.0, true}, JacobianSafetyProjection{0.2}}) {
+    out.push_back(method);
+  }
   for (const DampingRule rule :
        {DampingRule::NumericalFiltering, DampingRule::Manipulability, DampingRule::SmallestSingularValue}) {
     for (const bool relative : {true, false}) {
@@ -65,7 +60,7 @@ VectorXd qdot(const Spectrum& s, const Resolution& r) {
   return out;
 }
 
-// g_i and p_i as the table of inverse.hpp and the papers have them, written as directly as can be.
+// g_i and p_i as the table of rules.hpp and the papers have them, written as directly as can be.
 struct Expected {
   double g, p;
   double gain;  // of g per u_iᵀẋ, or per u_iᵀKẋ

@@ -13,32 +13,19 @@
 
 #include "arms.hpp"
 #include "heap.hpp"
+#include "methods.hpp"
 #include "random.hpp"
 
 namespace {
 
 using namespace sigmaik;
+using test::all_methods;
 using test::MatrixXd;
 using test::Random;
 using test::VectorXd;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-
-std::vector<Method> all_methods() {
-  return {PseudoInverse{},
-          DampedLeastSquares{},
-          AdaptiveDampedLeastSquares{},
-          AdaptiveDampedLeastSquares{DampingRule::Manipulability},
-          AdaptiveDampedLeastSquares{DampingRule::SmallestSingularValue},
-          SelectivelyDampedLeastSquares{},
-          JParse{},
-          JParse{0.2, 2.0, 0.5, true},
-          JParse{0.2, 2.0, 0.5, false},
-          JacobianProjection{},
-          JacobianSafety{},
-          JacobianSafetyProjection{}};
-}
 
 using test::arms;
 

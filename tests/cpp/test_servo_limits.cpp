@@ -18,6 +18,7 @@
 
 #include "arms.hpp"
 #include "heap.hpp"
+#include "methods.hpp"
 #include "random.hpp"
 
 namespace {
@@ -31,17 +32,6 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 using test::arms;
-
-std::vector<Method> some_methods() {
-  return {PseudoInverse{},
-          DampedLeastSquares{},
-          AdaptiveDampedLeastSquares{},
-          SelectivelyDampedLeastSquares{},
-          JParse{},
-          JacobianProjection{},
-          JacobianSafety{},
-          JacobianSafetyProjection{}};
-}
 
 Jacobian jacobian(const Chain& chain, const JointVector& q) {
   ChainState state;
@@ -111,7 +101,7 @@ TEST_CASE("while no limit is met the answer is the rule's, to the last digit") {
   for (const auto& [key, shipped] : arms()) {
     const std::string& name = key;
     const Chain chain = complete(shipped, 500.0);
-    for (const Method& method : some_methods()) {
+    for (const Method& method : test::library_methods()) {
       for (const OnLimit on_limit : {OnLimit::Redistribute, OnLimit::Scale}) {
         CAPTURE(name);
         Random random(1);

@@ -1,5 +1,6 @@
 """What holds for every arm: random chains of 1 to 9 joints, prismatic ones included, made as URDF text."""
 
+import all_methods
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -9,22 +10,7 @@ from scipy.spatial.transform import Rotation
 
 import sigmaik as sk
 
-METHODS = [
-    sk.PseudoInverse(),
-    sk.PseudoInverse(0.05),
-    sk.DampedLeastSquares(),
-    sk.AdaptiveDampedLeastSquares(),
-    sk.AdaptiveDampedLeastSquares("manipulability"),
-    sk.AdaptiveDampedLeastSquares("smallest_singular_value"),
-    sk.AdaptiveDampedLeastSquares(relative=False),
-    sk.SelectivelyDampedLeastSquares(),
-    sk.JParse(),
-    sk.JParse(0.2, 2.0, 0.5),
-    sk.JParse(0.2, 2.0, 0.5, continuous=False),
-    sk.JacobianProjection(),
-    sk.JacobianSafety(),
-    sk.JacobianSafetyProjection(),
-]
+METHODS = [*all_methods.METHODS, sk.PseudoInverse(0.05), sk.AdaptiveDampedLeastSquares(relative=False)]
 # Those that do in full what they take for regular.
 EXACT = [m for m in METHODS if not isinstance(m, (sk.DampedLeastSquares, sk.SelectivelyDampedLeastSquares))]
 

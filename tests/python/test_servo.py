@@ -5,22 +5,12 @@ tests/cpp/test_servo.cpp has more.
 
 import numpy as np
 import pytest
+from all_methods import METHODS
 from scipy.spatial.transform import Rotation
 
 import sigmaik as sk
 
 ARMS = sk.robots.names()
-METHODS = [
-    sk.PseudoInverse(),
-    sk.DampedLeastSquares(),
-    sk.AdaptiveDampedLeastSquares(),
-    sk.SelectivelyDampedLeastSquares(),
-    sk.JParse(),
-    sk.JParse(0.1, 2.0, 2.0, continuous=False),
-    sk.JacobianProjection(),
-    sk.JacobianSafety(),
-    sk.JacobianSafetyProjection(),
-]
 
 
 @pytest.fixture(params=ARMS)

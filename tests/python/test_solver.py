@@ -2,23 +2,9 @@
 
 import numpy as np
 import pytest
+from all_methods import METHODS
 
 import sigmaik as sk
-
-METHODS = [
-    sk.PseudoInverse(),
-    sk.DampedLeastSquares(),
-    sk.AdaptiveDampedLeastSquares(),
-    sk.AdaptiveDampedLeastSquares("manipulability"),
-    sk.AdaptiveDampedLeastSquares("smallest_singular_value"),
-    sk.SelectivelyDampedLeastSquares(),
-    sk.JParse(),
-    sk.JParse(0.2, 2.0, 0.5),
-    sk.JParse(0.2, 2.0, 0.5, continuous=False),
-    sk.JacobianProjection(),
-    sk.JacobianSafety(),
-    sk.JacobianSafetyProjection(),
-]
 
 
 def random_rotation(rng):

@@ -36,6 +36,7 @@ def test_the_map_of_the_headers_is_true(headers):
         ("///     task.hpp  ", "///     tusk.hpp  ", "tusk.hpp has a line, but there is no such header"),
         ("///     types.hpp  ", "///     chain.hpp  ", "chain.hpp has 2 lines"),
         ("///     types.hpp  ", "///     later.hpp  ", "chain.hpp needs types.hpp, which stands below it"),
+        ("///     rules/  ", "///     roles/  ", "rules/jparse.hpp has no line"),
         ("Task: which", "Tusk: which", "task.hpp does not speak of Tusk"),
         ("#include <sigmaik/batch.hpp>\n", "", "batch.hpp is said to be included, and is not"),
         ("#include <sigmaik/task", "#include <sigmaik/kdl.hpp>\n#include <sigmaik/task", "kdl.hpp includes KDL"),
@@ -56,6 +57,12 @@ def test_a_header_that_comes_through_another_is_found(headers):
     found = check("check_map.py", headers)
     assert "servo_loop.hpp is included through another header" in found
     assert "task.hpp needs servo_loop.hpp, which stands below it" in found
+
+
+def test_a_header_of_a_directory_that_needs_what_stands_below_it_is_found(headers):
+    rule = headers / "sigmaik" / "rules" / "jparse.hpp"
+    rule.write_text("#include <sigmaik/servo.hpp>\n" + rule.read_text(encoding="utf-8"), encoding="utf-8")
+    assert "rules/ needs servo.hpp, which stands below it" in check("check_map.py", headers)
 
 
 @pytest.fixture

@@ -5,8 +5,8 @@
 #include <cstddef>
 #include <cstdint>
 
-#include <sigmaik/inverse.hpp>
 #include <sigmaik/layout.hpp>
+#include <sigmaik/rules.hpp>
 
 namespace sigmaik {
 

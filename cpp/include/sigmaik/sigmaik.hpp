@@ -14,7 +14,9 @@
 ///     pose.hpp             rotation_log, rotation_exp, pose_error
 ///     kinematics.hpp       update, jacobian_gradient: pose and Jacobian of an arm; the Jacobian's derivative
 ///     spectrum.hpp         Spectrum: singular value decomposition with a warm start
-///     inverse.hpp          JParse, DampedLeastSquares, …: one rule per singular direction
+///     parameters.hpp       the parameters of a rule: name, range and words
+///     rules/               JParse, DampedLeastSquares, …: what to do with one singular direction, one file a rule
+///     rules.hpp            Rules, Method: the list of the rules, and one of them or a rule of one's own
 ///     task.hpp             Task: which rows of a twist, in which axes
 ///     velocity_solver.hpp  VelocitySolver: rule and posture → Solution
 ///     batch.hpp            solve_batch: many at once
@@ -56,12 +58,13 @@
 #include <sigmaik/dynamics.hpp>
 #include <sigmaik/error.hpp>
 #include <sigmaik/indices.hpp>
-#include <sigmaik/inverse.hpp>
 #include <sigmaik/kinematics.hpp>
 #include <sigmaik/layout.hpp>
 #include <sigmaik/least_squares.hpp>
 #include <sigmaik/limits.hpp>
+#include <sigmaik/parameters.hpp>
 #include <sigmaik/pose.hpp>
+#include <sigmaik/rules.hpp>
 #include <sigmaik/servo.hpp>
 #include <sigmaik/singularities.hpp>
 #include <sigmaik/spectrum.hpp>

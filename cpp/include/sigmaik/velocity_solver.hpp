@@ -4,8 +4,8 @@
 
 #include <cstdint>
 
-#include <sigmaik/inverse.hpp>
 #include <sigmaik/layout.hpp>
+#include <sigmaik/rules.hpp>
 #include <sigmaik/spectrum.hpp>
 #include <sigmaik/status.hpp>
 #include <sigmaik/task.hpp>
@@ -62,6 +62,26 @@ class VelocitySolver {
   const Spectrum& spectrum() const noexcept { return spectrum_; }
 
  private:
+  // What solve() was asked, and how the task reads it.
+  struct Question {
+    const TaskJacobianRef& jacobian;
+    const TaskRef& twist;
+    const JointRef& posture;
+    const Eigen::Matrix3d& rotation;
+    std::uint8_t angular;  // bit i: row i of the task is angular
+    bool select;           // the task's rows have to be taken from six
+  };
+  bool selects(const TaskJacobianRef& jacobian) const noexcept;
+  // Whether sizes fit and every number is finite.
+  bool checked(const TaskJacobianRef& jacobian, const TaskRef& twist, const JointRef& posture,
+               const Eigen::Matrix3d& rotation) const noexcept;
+  // Decomposes the task's rows, angular ones times length_scale; `command` becomes the twist in these rows. false where
+  // a number overflows.
+  bool weighted(const Question& question, TaskVector& command) noexcept;
+  Solution answer(const Question& question, const TaskVector& command, Resolution resolution) const noexcept;
+  // Whether the answer misses at most `tolerance` of the command, in the task's weighted rows.
+  bool exact(const Question& question, const TaskVector& achieved, double tolerance) const noexcept;
+
   Method method_;
   double length_scale_;
   Task task_;

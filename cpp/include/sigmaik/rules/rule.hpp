@@ -1,0 +1,203 @@
+#pragma once
+/// \file rule.hpp
+/// What a rule is: a struct of parameters that says what to do with one singular direction of J = Σ σ_i u_i v_iᵀ.
+///
+///     q̇ = Σ_i g_i v_i + (I − Σ_i p_i v_i v_iᵀ) q̇_posture
+///
+/// A rule needs a name, relative_threshold() and at(σ_i, the spectrum) (concept Rule). Any such struct, also one of an
+/// application, runs through VelocitySolver and Servo: see CustomRule, and cpp/examples/08_own_rule.cpp.
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <concepts>
+#include <cstdint>
+
+#include <sigmaik/error.hpp>
+#include <sigmaik/parameters.hpp>
+#include <sigmaik/spectrum.hpp>
+#include <sigmaik/types.hpp>
+
+namespace sigmaik {
+
+/// A relative σ that is zero but for rounding: for rules that must not divide by it and have no threshold of their own.
+inline constexpr double kRankTolerance = 1e-12;
+/// relative_threshold() of rules that have none of their own.
+inline constexpr double kDefaultThreshold = 0.1;
+
+/// What a rule says of one direction: g_i = inverse · u_iᵀẋ.
+struct Direction {
+  double inverse = 0.0;    ///< g_i / u_iᵀẋ
+  double projector = 0.0;  ///< p_i: the part of the posture's motion along v_i that is taken away, in [0, 1]
+  bool regular = true;     ///< false: the direction counts as singular in the answer
+  /// w in [0, 1], for rules with row_gains(): the command along u_i is u_iᵀ(I + w (K − I))ẋ.
+  double gain_weight = 0.0;
+};
+
+/// What a rule sees of the whole spectrum, beside its own σ_i.
+class SpectrumSummary {
+ public:
+  explicit SpectrumSummary(const Spectrum& spectrum) noexcept
+      : largest(spectrum.sigma(0)), smallest(spectrum.sigma(spectrum.size() - 1)), spectrum_(&spectrum) {}
+
+  const double largest;   ///< σ_max > 0
+  const double smallest;  ///< σ_min ≥ 0
+
+  /// Π σ_i / unit over all directions. Computed once.
+  double manipulability(double unit) const noexcept {
+    if (unit != unit_) {
+      unit_ = unit;
+      product_ = 1.0;
+      for (int i = 0; i < spectrum_->size(); ++i) product_ *= spectrum_->sigma(i) / unit;
+    }
+    return product_;
+  }
+
+ private:
+  const Spectrum* spectrum_;
+  mutable double unit_ = 0.0, product_ = 0.0;
+};
+
+/// The paper's K = diag(linear, angular), of the command's rows.
+struct RowGains {
+  double linear = 1.0;
+  double angular = 1.0;
+};
+
+/// A rule. at() and relative_threshold() are called in the loop: noexcept, bounded, without heap.
+///
+/// - `kName` is the rule's name in texts of errors.
+/// - relative_threshold(), in (0, 1]: a direction with σ_i at or below this part of σ_max is near a singularity. A
+/// Servo
+///   weighs the directions with it where limits act.
+/// - at(σ_i ≥ 0, the spectrum) says what to do with a direction.
+///
+/// Set-up checks the ranges of parameters(), where a rule has that table, and calls check(), where it has that.
+template <typename R>
+concept Rule = requires(const R rule, double sigma, const SpectrumSummary& spectrum) {
+  { R::kName } -> std::convertible_to<const char*>;
+  { rule.relative_threshold() } noexcept -> std::same_as<double>;
+  { rule.at(sigma, spectrum) } noexcept -> std::same_as<Direction>;
+} && std::copyable<R>;  // last: asked of a type that takes a Method, it would depend on itself
+
+/// Checks the parameters of a rule.
+/// \throws Error with the parameter, its value and its range
+template <Rule R>
+void check_rule(const R& rule) {
+  if constexpr (requires { R::parameters(); }) check_parameters(rule);
+  if constexpr (requires { rule.check(); }) rule.check();
+  check_range(R::kName, "relative_threshold()", rule.relative_threshold(), {0.0, 1.0, true});
+}
+
+/// A rule that amplifies the command's rows along singular directions, see Direction::gain_weight.
+template <typename R>
+concept AmplifyingRule = Rule<R> && requires(const R rule) {
+  { rule.row_gains() } noexcept -> std::same_as<RowGains>;
+};
+
+/// A rule that bounds joint speeds: those from one direction, and those from all.
+template <typename R>
+concept ClampingRule = Rule<R> && requires(const R rule, const Spectrum& spectrum, int i) {
+  { rule.speed_bound(spectrum, i) } noexcept -> std::same_as<double>;
+  { rule.speed_bound() } noexcept -> std::same_as<double>;
+};
+
+/// What a rule made of a command.
+struct Resolution {
+  std::array<double, kMaxTask> speed{};      ///< g_i: q̇ = Σ g_i v_i; 0 beyond size()
+  std::array<double, kMaxTask> projector{};  ///< p_i of the posture; 0 beyond size()
+  std::uint8_t singular = 0;                 ///< bit i: the rule does not treat direction u_i as regular
+  bool exact = true;                         ///< every direction that the command uses is done in full
+};
+
+namespace detail {
+
+// Part of the command that a direction may lose before the answer counts as damped.
+inline constexpr double kExact = 1e-9;
+// A Jacobian this small moves nothing; its inverse would only overflow.
+inline constexpr double kVanishing = 1e-100;
+
+// σ/(σ²+λ²) and σ²/(σ²+λ²) without squares that overflow or vanish.
+inline Direction damped(double sigma, double lambda, bool regular) noexcept {
+  if (sigma <= 0.0) return {0.0, 0.0, regular};
+  if (lambda <= sigma) {
+    const double ratio = lambda / sigma, part = 1.0 / (1.0 + ratio * ratio);
+    return {part / sigma, part, regular};
+  }
+  const double ratio = sigma / lambda, part = 1.0 / (1.0 + ratio * ratio);
+  return {ratio * part / lambda, ratio * ratio * part, regular};
+}
+
+// 1/σ_i, or nothing.
+inline Direction truncated(double sigma, bool keep, double projector_if_dropped) noexcept {
+  if (keep) return {1.0 / sigma, 1.0, true};
+  return {0.0, projector_if_dropped, false};
+}
+
+}  // namespace detail
+
+/// Applies one rule, known when compiling. Real time.
+/// \param command (m,) in the rows of the spectrum
+/// \param angular bit i: row i of the command is angular
+template <Rule R>
+Resolution resolve_by(const R& rule, const Spectrum& spectrum, const TaskVector& command,
+                      std::uint8_t angular) noexcept {
+  const int m = spectrum.rows(), size = spectrum.size();
+  Resolution out;
+  const double enough = detail::kExact * command.cwiseAbs().maxCoeff();  // a norm's squares overflow and vanish
+  const SpectrumSummary summary(spectrum);
+  const std::array<double, kMaxTask> parts = spectrum.along_u(command);
+
+  // Rows that no joint can move at all, of an m×n matrix with m > n.
+  for (int i = size; i < m; ++i) {
+    out.singular |= static_cast<std::uint8_t>(1u << i);
+    if (std::abs(parts[static_cast<std::size_t>(i)]) > enough) out.exact = false;
+  }
+  if (summary.largest < detail::kVanishing) {
+    out.singular = static_cast<std::uint8_t>((1u << m) - 1u);
+    out.exact = command.isZero(0.0);
+    return out;
+  }
+
+  std::array<double, kMaxTask> amplified = parts;  // u_iᵀKẋ
+  if constexpr (AmplifyingRule<R>) {
+    const RowGains gains = rule.row_gains();
+    if (gains.linear != 1.0 || gains.angular != 1.0) {
+      TaskVector product = command;
+      for (int row = 0; row < m; ++row) product[row] *= (angular >> row & 1u) != 0 ? gains.angular : gains.linear;
+      amplified = spectrum.along_u(product);
+    }
+  }
+  for (int i = 0; i < size; ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    const double sigma = spectrum.sigma(i);
+    const Direction direction = rule.at(sigma, summary);
+    const double part = parts[at];
+    double speed = direction.inverse * (part + direction.gain_weight * (amplified[at] - part));
+    bool regular = direction.regular;
+    if constexpr (ClampingRule<R>) {
+      if (regular) {
+        const double fastest = std::abs(speed) * spectrum.v(i).cwiseAbs().maxCoeff();
+        const double bound = rule.speed_bound(spectrum, i);
+        if (fastest > bound) {
+          speed *= bound / fastest;
+          regular = false;
+        }
+      }
+    }
+    out.speed[at] = speed;
+    out.projector[at] = direction.projector;
+    if (!regular) out.singular |= static_cast<std::uint8_t>(1u << i);
+    if (std::abs(sigma * speed - part) > enough) out.exact = false;
+  }
+  if constexpr (ClampingRule<R>) {
+    const double fastest = spectrum.combine_v(out.speed).cwiseAbs().maxCoeff();
+    if (fastest > rule.speed_bound()) {
+      for (double& speed : out.speed) speed *= rule.speed_bound() / fastest;
+      out.exact = false;
+    }
+  }
+  return out;
+}
+
+}  // namespace sigmaik

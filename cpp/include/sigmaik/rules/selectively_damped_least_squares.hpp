@@ -1,0 +1,52 @@
+#pragma once
+/// \file selectively_damped_least_squares.hpp
+
+#include <algorithm>
+#include <cmath>
+
+#include <sigmaik/parameters.hpp>
+#include <sigmaik/rules/rule.hpp>
+
+namespace sigmaik {
+
+/// Each direction clamped by what it moves the joints for what it moves the tip (Buss and Kim 2005), for
+/// velocities: their angle limit per update γ_max is a joint speed here. One end effector, whose twist counts
+/// as one target. Directions with σ_i ≤ 1e-12 σ_max are dropped. The answer depends on the basis chosen where
+/// singular values are equal, as the paper's does.
+struct SelectivelyDampedLeastSquares {
+  double max_speed = 0.7853981633974483;  ///< [rad/s] > 0: no joint is asked for more
+
+  static constexpr const char* kName = "SelectivelyDampedLeastSquares";
+  static constexpr const char* kShortName = "sdls";
+  static constexpr const char* kTitle = "selectively damped least squares";
+  static constexpr const char* kDoc =
+      "Each direction clamped by what it moves the joints for what it moves the tip (Buss and Kim 2005).\n\n"
+      "Their angle limit per update is a joint speed here. |q̇_j| ≤ max_speed.";
+  static constexpr auto parameters() {
+    return std::tuple{
+        param("max_speed", &SelectivelyDampedLeastSquares::max_speed, "[rad/s] > 0 (the paper's γ_max).").above(0.0)};
+  }
+
+  double relative_threshold() const noexcept { return kDefaultThreshold; }
+  Direction at(double sigma, const SpectrumSummary& spectrum) const noexcept {
+    return detail::truncated(sigma, sigma > kRankTolerance * spectrum.largest, 0.0);
+  }
+
+  double speed_bound() const noexcept { return max_speed; }
+  /// max_speed · min(1, N_i/M_i), with N_i = |u_i| = 1 what direction i moves the tip, and M_i = Σ_j |v_ji| |J_j| / σ_i
+  /// what the joints move the tip on their own.
+  double speed_bound(const Spectrum& spectrum, int i) const noexcept {
+    double moved = 0.0;
+    for (int j = 0; j < spectrum.cols(); ++j) {
+      double column = 0.0;  // |J_j|²/σ_max², from the decomposition
+      for (int l = 0; l < spectrum.size(); ++l) {
+        const double part = spectrum.sigma(l) / spectrum.sigma(0) * spectrum.v(l)[j];
+        column += part * part;
+      }
+      moved += std::abs(spectrum.v(i)[j]) * std::sqrt(column);
+    }
+    return max_speed * std::min(1.0, spectrum.sigma(i) / spectrum.sigma(0) / moved);
+  }
+};
+
+}  // namespace sigmaik
