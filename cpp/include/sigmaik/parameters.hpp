@@ -12,10 +12,10 @@ namespace sigmaik {
 
 /// Numbers that a parameter accepts; NaN is never one of them.
 struct Range {
-  double low = -std::numeric_limits<double>::infinity();
-  double high = std::numeric_limits<double>::infinity();
-  bool open = false;      ///< `low` itself is not accepted
-  const char* hint = "";  ///< for the error: what to do instead
+  double low = -std::numeric_limits<double>::infinity();  ///< least value, accepted unless `open`
+  double high = std::numeric_limits<double>::infinity();  ///< largest value, accepted
+  bool open = false;                                      ///< `low` itself is not accepted
+  const char* hint = "";                                  ///< for the error: what to do instead
 
   bool contains(double value) const noexcept;  ///< false for ±∞
 };
@@ -24,13 +24,14 @@ struct Range {
 /// return a changed copy.
 template <typename Owner, typename Value>
 struct Parameter {
-  using value_type = Value;
-  const char* name;       ///< keyword and attribute in Python
-  Value Owner::* member;  ///< where the value is
-  const char* doc;        ///< meaning, unit, range
-  std::optional<Range> range{};
-  std::optional<Value> none{};  ///< the value that Python spells None
+  using value_type = Value;      ///< type of the member
+  const char* name;              ///< keyword and attribute in Python
+  Value Owner::* member;         ///< where the value is
+  const char* doc;               ///< meaning, unit, range
+  std::optional<Range> range{};  ///< accepted numbers; none: all
+  std::optional<Value> none{};   ///< the value that Python spells None
 
+  /// The same for values above `low`; `hint` goes into the error.
   constexpr Parameter above(double low, const char* hint = "") const {
     Parameter out = *this;
     out.range = range.value_or(Range{});
@@ -39,18 +40,21 @@ struct Parameter {
     out.range->hint = hint;
     return out;
   }
+  /// The same for values of at least `low`.
   constexpr Parameter at_least(double low) const {
     Parameter out = *this;
     out.range = range.value_or(Range{});
     out.range->low = low;
     return out;
   }
+  /// The same for values of at most `high`.
   constexpr Parameter at_most(double high) const {
     Parameter out = *this;
     out.range = range.value_or(Range{});
     out.range->high = high;
     return out;
   }
+  /// The same with None in Python for `value`.
   constexpr Parameter none_is(const Value& value) const {
     Parameter out = *this;
     out.none = value;
@@ -58,6 +62,7 @@ struct Parameter {
   }
 };
 
+/// A parameter: its name, its member, and its meaning with unit and range.
 template <typename Owner, typename Value>
 constexpr Parameter<Owner, Value> param(const char* name, Value Owner::* member, const char* doc) {
   return {name, member, doc};
@@ -66,8 +71,8 @@ constexpr Parameter<Owner, Value> param(const char* name, Value Owner::* member,
 /// A value of an enum, and its text.
 template <typename Enum>
 struct Choice {
-  const char* text;
-  Enum value;
+  const char* text;  ///< the text in Python and on the command line
+  Enum value;        ///< the value
 };
 
 /// Specialised for each enum that is a parameter: `all`, an array of Choice.

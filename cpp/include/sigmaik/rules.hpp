@@ -37,6 +37,7 @@ namespace sigmaik {
 /// Some types, to go through one by one.
 template <typename... Types>
 struct TypeList {
+  /// Template<Types…, More…>.
   template <template <typename...> typename Template, typename... More>
   using Into = Template<Types..., More...>;
 

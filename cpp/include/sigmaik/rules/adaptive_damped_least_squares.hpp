@@ -22,8 +22,10 @@ enum class DampingRule {
   SmallestSingularValue,
 };
 
+/// Texts of the damping rules.
 template <>
 struct Choices<DampingRule> {
+  /// Text and value of each.
   static constexpr std::array all{Choice<DampingRule>{"numerical_filtering", DampingRule::NumericalFiltering},
                                   Choice<DampingRule>{"manipulability", DampingRule::Manipulability},
                                   Choice<DampingRule>{"smallest_singular_value", DampingRule::SmallestSingularValue}};
@@ -31,22 +33,27 @@ struct Choices<DampingRule> {
 
 /// Damping that grows towards a singularity and vanishes away from it.
 struct AdaptiveDampedLeastSquares {
-  DampingRule rule = DampingRule::NumericalFiltering;
-  double damping = 0.1;    ///< λ > 0, reached at the singularity
+  DampingRule rule = DampingRule::NumericalFiltering;  ///< how the distance to a singularity is measured
+  double damping = 0.1;                                ///< λ > 0, reached at the singularity
   double threshold = 0.0;  ///< ε or w₀ > 0 below which damping sets in; 0: 0.1, or 1e-3 for Manipulability
   /// λ and ε are fractions of σ_max, w₀ of σ_max^size: the same arm in other units, or of another size,
   /// behaves the same. false: absolute values, as in the papers.
   bool relative = true;
 
+  /// Name of the class.
   static constexpr const char* kName = "AdaptiveDampedLeastSquares";
+  /// Name on the command line.
   static constexpr const char* kShortName = "adaptive-dls";
+  /// Name in figures and tables.
   static constexpr const char* kTitle = "adaptive damped least squares";
+  /// Docstring of the Python class.
   static constexpr const char* kDoc =
       "Damping that grows towards a singularity and vanishes away from it. λ is `damping`, ε or w₀ `threshold`.\n\n"
       "rule 'numerical_filtering': only directions with σ_i < ε, λ_i² = (1 − (σ_i/ε)²) λ² (Maciejewski and Klein\n"
       "    1988, as in Chiaverini 1997; the answer is continuous too where several directions are small)\n"
       "rule 'manipulability': all directions, λ² (1 − w/w₀)² where w = Π σ_i < w₀ (Nakamura and Hanafusa 1986)\n"
       "rule 'smallest_singular_value': all directions, (1 − (σ_min/ε)²) λ² where σ_min < ε (Chiaverini 1997)";
+  /// Table of the parameters: name, member, meaning, range.
   static constexpr auto parameters() {
     using Self = AdaptiveDampedLeastSquares;
     return std::tuple{
@@ -60,10 +67,12 @@ struct AdaptiveDampedLeastSquares {
               "arm do not matter; False: absolute values, as in the papers.")};
   }
 
+  /// In (0, 1]: a direction with σ_i at or below this part of σ_max is near a singularity.
   double relative_threshold() const noexcept {
     const bool told = relative && rule != DampingRule::Manipulability && threshold > 0.0;
     return told ? std::min(threshold, 1.0) : kDefaultThreshold;
   }
+  /// What the rule does with a direction of singular value `sigma`.
   Direction at(double sigma, const SpectrumSummary& spectrum) const noexcept {
     const double unit = relative ? spectrum.largest : 1.0;
     const double lambda = damping * unit;

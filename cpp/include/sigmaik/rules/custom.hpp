@@ -38,9 +38,14 @@ class CustomRule {
     ::new (static_cast<void*>(bytes_.data())) R(rule);
   }
 
+  /// The struct's kName.
   const char* name() const noexcept { return functions_->name; }
+  /// Checks the parameters.
+  /// \throws Error with the parameter, its value and its range
   void check() const { functions_->check(bytes_.data()); }
+  /// In (0, 1]: a direction with σ_i at or below this part of σ_max is near a singularity.
   double relative_threshold() const noexcept { return functions_->relative_threshold(bytes_.data()); }
+  /// Applies the rule, see resolve(). Real time.
   Resolution resolve(const Spectrum& spectrum, const TaskVector& command, std::uint8_t angular) const noexcept {
     return functions_->resolve(bytes_.data(), spectrum, command, angular);
   }

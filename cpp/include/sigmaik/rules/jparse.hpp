@@ -20,13 +20,18 @@ struct JParse {
   /// published.
   bool singular_posture = false;
 
+  /// Name of the class.
   static constexpr const char* kName = "JParse";
+  /// Name on the command line.
   static constexpr const char* kShortName = "jparse";
+  /// Name in figures and tables.
   static constexpr const char* kTitle = "J-PARSE";
+  /// Docstring of the Python class.
   static constexpr const char* kDoc =
       "J-PARSE (Guptasarma et al.): u_iᵀẋ/σ_i where σ_i > γσ_max, else σ_i/(γσ_max)² u_iᵀKẋ.\n\n"
       "Regular directions are exact; along a singular one motion fades out at the singularity and can leave it\n"
       "again. |q̇| ≤ |ẋ|/(γσ_max) for unit gains.";
+  /// Table of the parameters: name, member, meaning, range.
   static constexpr auto parameters() {
     return std::tuple{
         param("gamma", &JParse::gamma, "threshold in (0, 1] on σ_i/σ_max.").above(0.0).at_most(1.0),
@@ -42,8 +47,11 @@ struct JParse {
               "does not act there, as published.")};
   }
 
+  /// In (0, 1]: a direction with σ_i at or below this part of σ_max is near a singularity.
   double relative_threshold() const noexcept { return gamma; }
+  /// The paper's K.
   RowGains row_gains() const noexcept { return {gain_linear, gain_angular}; }
+  /// What the rule does with a direction of singular value `sigma`.
   Direction at(double sigma, const SpectrumSummary& spectrum) const noexcept {
     const double threshold = gamma * spectrum.largest;
     if (sigma > threshold) return {1.0 / sigma, 1.0, true};

@@ -37,6 +37,7 @@ struct Direction {
 /// What a rule sees of the whole spectrum, beside its own σ_i.
 class SpectrumSummary {
  public:
+  /// Of a spectrum with at least one direction, which must outlive the summary.
   explicit SpectrumSummary(const Spectrum& spectrum) noexcept
       : largest(spectrum.sigma(0)), smallest(spectrum.sigma(spectrum.size() - 1)), spectrum_(&spectrum) {}
 
@@ -60,8 +61,8 @@ class SpectrumSummary {
 
 /// The paper's K = diag(linear, angular), of the command's rows.
 struct RowGains {
-  double linear = 1.0;
-  double angular = 1.0;
+  double linear = 1.0;   ///< factor of the linear rows
+  double angular = 1.0;  ///< factor of the angular rows
 };
 
 /// A rule. at() and relative_threshold() are called in the loop: noexcept, bounded, without heap.

@@ -16,22 +16,30 @@ namespace sigmaik {
 struct SelectivelyDampedLeastSquares {
   double max_speed = 0.7853981633974483;  ///< [rad/s] > 0: no joint is asked for more
 
+  /// Name of the class.
   static constexpr const char* kName = "SelectivelyDampedLeastSquares";
+  /// Name on the command line.
   static constexpr const char* kShortName = "sdls";
+  /// Name in figures and tables.
   static constexpr const char* kTitle = "selectively damped least squares";
+  /// Docstring of the Python class.
   static constexpr const char* kDoc =
       "Each direction clamped by what it moves the joints for what it moves the tip (Buss and Kim 2005).\n\n"
       "Their angle limit per update is a joint speed here. |q̇_j| ≤ max_speed.";
+  /// Table of the parameters: name, member, meaning, range.
   static constexpr auto parameters() {
     return std::tuple{
         param("max_speed", &SelectivelyDampedLeastSquares::max_speed, "[rad/s] > 0 (the paper's γ_max).").above(0.0)};
   }
 
+  /// In (0, 1]: a direction with σ_i at or below this part of σ_max is near a singularity.
   double relative_threshold() const noexcept { return kDefaultThreshold; }
+  /// What the rule does with a direction of singular value `sigma`.
   Direction at(double sigma, const SpectrumSummary& spectrum) const noexcept {
     return detail::truncated(sigma, sigma > kRankTolerance * spectrum.largest, 0.0);
   }
 
+  /// Bound of every joint speed, of all directions together [rad/s].
   double speed_bound() const noexcept { return max_speed; }
   /// max_speed · min(1, N_i/M_i), with N_i = |u_i| = 1 what direction i moves the tip, and M_i = Σ_j |v_ji| |J_j| / σ_i
   /// what the joints move the tip on their own.
