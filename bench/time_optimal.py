@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 import sigmaik as sk
-from sigmaik.planning.time_optimal import time_optimal
+from sigmaik.planning import time_optimal
 from sigmaik_lab.montecarlo.experiment import MonteCarlo, sample_pair
 
 EQUAL = 1e-4

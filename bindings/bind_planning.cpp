@@ -3,12 +3,18 @@
 #include <sigmaik/planning/time_optimal.hpp>
 
 #include "arguments.hpp"
+#include "planning.hpp"
 #include "python_cost.hpp"
 
 namespace sigmaik::bindings {
 namespace {
 
+using planning::ArmSpheres;
+using planning::CollisionCheck;
+using planning::DistanceField;
+using planning::GradientOptions;
 using planning::JointCost;
+using planning::StochasticOptions;
 using planning::TimeOptimal;
 using planning::TimeOptimalOptions;
 using planning::TimeOptimalProblem;
@@ -36,9 +42,25 @@ py::array_t<double> evaluate_all(const JointCost& cost, const ArrayLike& q, int 
   return gradients ? gradient : value;
 }
 
+std::optional<CollisionCheck> check_of(const std::optional<ArmSpheres>& spheres,
+                                       const std::optional<DistanceField>& field) {
+  if (!spheres || !field) return std::nullopt;
+  return CollisionCheck(*spheres, *field);
+}
+
+TimeOptimalProblem problem_argument(const TimeOptimal& t, const ArrayLike& start, const ArrayLike& goal,
+                                    const MaybeArray& start_velocity, const MaybeArray& goal_velocity,
+                                    const MaybeArray& bend) {
+  const int n = t.chain().dof();
+  return {joint_argument(start, "start", n), joint_argument(goal, "goal", n),
+          optional_joint_argument(object_of(start_velocity), "start_velocity", n),
+          optional_joint_argument(object_of(goal_velocity), "goal_velocity", n),
+          optional_joint_argument(object_of(bend), "bend", n)};
+}
+
 }  // namespace
 
-void bind_planning(py::module_& m) {
+void bind_joint_cost(py::module_& m) {
   py::class_<JointCost, std::shared_ptr<JointCost>>(m, "JointCost",
                                                     "A smooth cost of joint positions, with its derivatives.")
       .def_property_readonly("dof", &JointCost::dof, "Number of joints, n.")
@@ -63,7 +85,9 @@ void bind_planning(py::module_& m) {
           "gradients",
           [](const JointCost& c, const ArrayLike& q, int threads) { return evaluate_all(c, q, threads, true); },
           py::arg("q"), py::arg("threads") = 1, "Gradients (B, n) at q (B, n), without the GIL.");
+}
 
+void bind_planning(py::module_& m) {
   m.def(
       "potential_cost",
       [](const SingularSets& sets, double weight, double eta1, double eta2) {
@@ -96,6 +120,12 @@ void bind_planning(py::module_& m) {
       },
       py::arg("chain"), py::arg("weight"), "−weight · log m(q), m no less than 1e-9.");
   m.def(
+      "scaled_cost",
+      [](double factor, const std::shared_ptr<JointCost>& cost) {
+        return std::const_pointer_cast<JointCost>(planning::scaled_cost(factor, cost));
+      },
+      py::arg("factor"), py::arg("cost"), "factor · cost.");
+  m.def(
       "sum_of_costs",
       [](const std::vector<std::shared_ptr<JointCost>>& costs) {
         return std::const_pointer_cast<JointCost>(planning::sum_of_costs({costs.begin(), costs.end()}));
@@ -125,10 +155,13 @@ void bind_planning(py::module_& m) {
                              "Motions as support states under a Gaussian-process prior (Petrović et al.).\n"
                              "`sigmaik.planning.stochastic` and `gradient` are what to call.")
       .def(py::init([](const Chain& chain, const std::optional<std::shared_ptr<JointCost>>& cost, int states,
-                       const std::vector<py::object>& python_costs) {
-             return SupportPlanner(chain, with_python_costs(cost.value_or(nullptr), chain.dof(), python_costs), states);
+                       const std::vector<py::object>& python_costs, const std::optional<ArmSpheres>& spheres,
+                       const std::optional<DistanceField>& field) {
+             return SupportPlanner(chain, with_python_costs(cost.value_or(nullptr), chain.dof(), python_costs), states,
+                                   check_of(spheres, field));
            }),
            py::arg("chain"), py::arg("cost"), py::arg("states"), py::arg("python_costs") = std::vector<py::object>{},
+           py::arg("spheres") = py::none(), py::arg("field") = py::none(),
            "`cost` and those of `python_costs` (value(q: (B, n)) -> (B,), gradient or not) are added up.\n\n"
            "Raises Error where there is none, or one is not a cost of this chain's joints.")
       .def(
@@ -151,13 +184,46 @@ void bind_planning(py::module_& m) {
             const int n = p.chain().dof();
             const JointVector from = joint_argument(start, "start", n), to = joint_argument(goal, "goal", n);
             py::gil_scoped_release release;
-            return p.stochastic(
-                from, to,
-                {p.states(), samples, max_iterations, deviation, decay, temperature, prior_weight, tolerance, seed});
+            return p.stochastic(from, to,
+                                StochasticOptions{p.states(), samples, max_iterations, deviation, decay, temperature,
+                                                  prior_weight, tolerance, seed});
           },
           py::arg("start"), py::arg("goal"), py::kw_only(), py::arg("samples"), py::arg("max_iterations"),
           py::arg("deviation"), py::arg("decay"), py::arg("temperature"), py::arg("prior_weight"), py::arg("tolerance"),
           py::arg("seed"))
+      .def(
+          "plan_gradient",
+          [](SupportPlanner& p, const ArrayLike& start, const ArrayLike& goal, double prior_weight, int max_iterations,
+             double tolerance, int restarts, std::optional<double> duration) {
+            const int n = p.chain().dof();
+            const JointVector from = joint_argument(start, "start", n), to = joint_argument(goal, "goal", n);
+            py::gil_scoped_release release;
+            return p.plan(from, to,
+                          GradientOptions{p.states(), prior_weight, max_iterations, tolerance, restarts, duration});
+          },
+          py::arg("start"), py::arg("goal"), py::kw_only(), py::arg("prior_weight") = GradientOptions{}.prior_weight,
+          py::arg("max_iterations") = GradientOptions{}.max_iterations,
+          py::arg("tolerance") = GradientOptions{}.tolerance, py::arg("restarts") = GradientOptions{}.restarts,
+          py::arg("duration") = GradientOptions{}.duration)
+      .def(
+          "plan_stochastic",
+          [](SupportPlanner& p, const ArrayLike& start, const ArrayLike& goal, int samples, int max_iterations,
+             double deviation, double decay, double temperature, double prior_weight, double tolerance,
+             std::uint64_t seed, bool refine, std::optional<double> duration) {
+            const int n = p.chain().dof();
+            const JointVector from = joint_argument(start, "start", n), to = joint_argument(goal, "goal", n);
+            py::gil_scoped_release release;
+            return p.plan(from, to,
+                          StochasticOptions{p.states(), samples, max_iterations, deviation, decay, temperature,
+                                            prior_weight, tolerance, seed, refine, duration});
+          },
+          py::arg("start"), py::arg("goal"), py::kw_only(), py::arg("samples") = StochasticOptions{}.samples,
+          py::arg("max_iterations") = StochasticOptions{}.max_iterations,
+          py::arg("deviation") = StochasticOptions{}.deviation, py::arg("decay") = StochasticOptions{}.decay,
+          py::arg("temperature") = StochasticOptions{}.temperature,
+          py::arg("prior_weight") = StochasticOptions{}.prior_weight,
+          py::arg("tolerance") = StochasticOptions{}.tolerance, py::arg("seed") = StochasticOptions{}.seed,
+          py::arg("refine") = StochasticOptions{}.refine, py::arg("duration") = StochasticOptions{}.duration)
       .def(
           "draw",
           [](SupportPlanner& p, const ArrayLike& start, const ArrayLike& goal, double deviation, std::uint64_t seed) {
@@ -192,10 +258,13 @@ void bind_planning(py::module_& m) {
       "method made for double integrators. `sigmaik.planning.time_optimal` is what to call.")
       .def(py::init([](const Chain& chain, const std::optional<std::shared_ptr<JointCost>>& cost, int node_count,
                        double time_weight, double effort_weight, double tolerance, int max_iterations,
-                       bool between_nodes, bool restarts) {
-             return TimeOptimal(
-                 chain, cost.value_or(nullptr),
-                 {node_count, time_weight, effort_weight, tolerance, max_iterations, between_nodes, restarts});
+                       bool between_nodes, bool restarts, double clearance_width,
+                       const std::optional<SingularSets>& sets, const std::optional<ArmSpheres>& spheres,
+                       const std::optional<DistanceField>& field) {
+             const TimeOptimalOptions options{node_count,     time_weight,   effort_weight, tolerance,
+                                              max_iterations, between_nodes, restarts,      clearance_width};
+             return TimeOptimal(chain, cost.value_or(nullptr), options, sets ? sets : SingularSets::of(chain),
+                                check_of(spheres, field));
            }),
            py::arg("chain"), py::arg("cost"), py::kw_only(), py::arg("nodes") = TimeOptimalOptions{}.nodes,
            py::arg("time_weight") = TimeOptimalOptions{}.time_weight,
@@ -203,16 +272,28 @@ void bind_planning(py::module_& m) {
            py::arg("tolerance") = TimeOptimalOptions{}.tolerance,
            py::arg("max_iterations") = TimeOptimalOptions{}.max_iterations,
            py::arg("between_nodes") = TimeOptimalOptions{}.between_nodes,
-           py::arg("restarts") = TimeOptimalOptions{}.restarts, "Raises Error where an option is out of its range.")
+           py::arg("restarts") = TimeOptimalOptions{}.restarts,
+           py::arg("clearance_width") = TimeOptimalOptions{}.clearance_width, py::arg("sets") = py::none(),
+           py::arg("spheres") = py::none(), py::arg("field") = py::none(),
+           "Raises Error where an option is out of its range.")
+      .def(
+          "plan",
+          [](TimeOptimal& t, const ArrayLike& start, const ArrayLike& goal, const MaybeArray& start_velocity,
+             const MaybeArray& goal_velocity) {
+            const TimeOptimalProblem problem = problem_argument(t, start, goal, start_velocity, goal_velocity, {});
+            py::gil_scoped_release release;
+            return t.plan(problem);
+          },
+          py::arg("start"), py::arg("goal"), py::arg("start_velocity") = py::none(),
+          py::arg("goal_velocity") = py::none(),
+          "A motion with its clearance, and, where it crosses a singular set that it need not, the better of it and "
+          "of\n"
+          "one from the other side.")
       .def(
           "solve",
           [](TimeOptimal& t, const ArrayLike& start, const ArrayLike& goal, const MaybeArray& start_velocity,
              const MaybeArray& goal_velocity, const MaybeArray& bend) {
-            const int n = t.chain().dof();
-            const TimeOptimalProblem problem{joint_argument(start, "start", n), joint_argument(goal, "goal", n),
-                                             optional_joint_argument(object_of(start_velocity), "start_velocity", n),
-                                             optional_joint_argument(object_of(goal_velocity), "goal_velocity", n),
-                                             optional_joint_argument(object_of(bend), "bend", n)};
+            const TimeOptimalProblem problem = problem_argument(t, start, goal, start_velocity, goal_velocity, bend);
             py::gil_scoped_release release;
             return t.solve(problem);
           },

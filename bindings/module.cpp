@@ -1,6 +1,7 @@
 #include <pybind11/native_enum.h>
 
 #include "fields.hpp"
+#include "planning.hpp"
 
 namespace sigmaik::bindings {
 
@@ -62,7 +63,9 @@ PYBIND11_MODULE(_core, m) {
   bind_constrained_ik(m);
   bind_indices(m);
   bind_singularities(m);
+  bind_trajectory(m);
+  bind_joint_cost(m);
+  bind_obstacles(m);
   bind_planning(m);
   bind_cart(m);
-  bind_obstacles(m);
 }

@@ -6,8 +6,11 @@ import collections.abc
 import enum
 import numpy
 import numpy.typing
+import os
+import pathlib
+import sigmaik.planning.status
 import typing
-__all__: list[str] = ['AdaptiveDampedLeastSquares', 'AnalyticBranch', 'AnalyticIk', 'ArgumentError', 'ArmSpheres', 'CartError', 'CartLaw', 'CartRegion', 'Chain', 'ComputedTorque', 'ComputedTorqueStep', 'ConstrainedIk', 'ConstrainedIkStep', 'DEFAULT_SCALE', 'DampedLeastSquares', 'DistanceField', 'Dynamics', 'Error', 'Inertia', 'JParse', 'JacobianProjection', 'JacobianSafety', 'JacobianSafetyProjection', 'JointCost', 'JointLimits', 'LeastSquaresSolution', 'LoopCommand', 'LoopStatistics', 'Method', 'PlaneCartLaw', 'PseudoInverse', 'SampleCounts', 'SampleStatus', 'Segment', 'SelectivelyDampedLeastSquares', 'Servo', 'ServoLoop', 'ServoStep', 'SingularSets', 'Solution', 'Spectrum', 'Status', 'StreamStatus', 'SupportPlanner', 'SupportStates', 'Target', 'TargetStream', 'TimeOptimal', 'TimeOptimalResult', 'VelocitySolver', 'cart_descent', 'cart_law', 'collision_cost', 'evaluate_index', 'forbidden_intervals', 'geometry_aware_cost', 'index_of_jacobian', 'joint_limit_cost', 'known_singular_sets', 'least_squares', 'load_singular_sets', 'log_manipulability_cost', 'manipulability_cost', 'min_distance', 'plane_cart_law', 'pose_error', 'potential_cost', 'reference_scale', 'rotation_exp', 'rotation_log', 'rules', 'self_collision_cost', 'self_collision_pairs', 'singular_sets_of', 'solve_batch', 'spline_velocities', 'sum_of_costs', 'taut_string']
+__all__: list[str] = ['AdaptiveDampedLeastSquares', 'AnalyticBranch', 'AnalyticIk', 'ArgumentError', 'ArmSpheres', 'CartError', 'CartMeasures', 'CartMotion', 'CartRegion', 'Chain', 'Clearance', 'ComputedTorque', 'ComputedTorqueStep', 'ConstrainedIk', 'ConstrainedIkStep', 'Crossing', 'DEFAULT_SCALE', 'DampedLeastSquares', 'DistanceField', 'Dynamics', 'Error', 'Inertia', 'JParse', 'JacobianProjection', 'JacobianSafety', 'JacobianSafetyProjection', 'JointCost', 'JointLimits', 'LeastSquaresSolution', 'LoopCommand', 'LoopStatistics', 'Method', 'PlaneCartMotion', 'Playback', 'PseudoInverse', 'SampleCounts', 'SampleStatus', 'Segment', 'SelectivelyDampedLeastSquares', 'Servo', 'ServoLoop', 'ServoStep', 'SingularSets', 'Solution', 'Spectrum', 'Status', 'StreamStatus', 'SupportPlanner', 'SupportStates', 'Target', 'TargetStream', 'TimeOptimal', 'TimeOptimalResult', 'Trajectory', 'VelocitySolver', 'admissible_guess', 'cart_descent', 'cart_motion', 'cart_motion_by_descent', 'clearance', 'collision_cost', 'evaluate_cart_motion', 'evaluate_cart_motion_plane', 'evaluate_index', 'forbidden_intervals', 'geometry_aware_cost', 'index_of_jacobian', 'joint_limit_cost', 'known_singular_sets', 'least_squares', 'load_singular_sets', 'log_manipulability_cost', 'manipulability_cost', 'min_distance', 'plane_cart_motion', 'play', 'pose_error', 'potential_cost', 'reference_scale', 'rotation_exp', 'rotation_log', 'rules', 'scaled_cost', 'self_collision_cost', 'self_collision_pairs', 'singular_sets_of', 'solve_batch', 'spline_velocities', 'sum_of_costs', 'taut_string']
 class Error(ValueError):
     """
     What set-up and checked calls refuse. The text carries the facts.
@@ -1290,6 +1293,281 @@ class SingularSets:
         """
         Of the sets, c of them.
         """
+class Crossing:
+    """
+    A motion goes through a singular set here, or so near to it that the set's potential does not
+    tell the difference.
+    """
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[str, float, list[float], float, bool]:
+        ...
+    def __init__(self, name: str, t: typing.SupportsFloat | typing.SupportsIndex, q: numpy.typing.ArrayLike, psi: typing.SupportsFloat | typing.SupportsIndex, avoidable: bool) -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
+    @property
+    def avoidable(self) -> bool:
+        """
+        Whether a path from start to goal can do without.
+        """
+    @property
+    def name(self) -> str:
+        """
+        Name of the set.
+        """
+    @property
+    def psi(self) -> float:
+        """
+        ψ there: 0 on the set.
+        """
+    @property
+    def q(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (n,) [rad or m] there.
+        """
+    @property
+    def t(self) -> float:
+        """
+        [s]
+        """
+class Clearance:
+    """
+    Singularity along a motion that is sampled densely, M samples.
+    """
+    def __getstate__(self) -> tuple[list[float], list[float], list[str], list[float], list[Crossing]]:
+        ...
+    def __init__(self, t: numpy.typing.ArrayLike, manipulability: numpy.typing.ArrayLike, names: collections.abc.Sequence[str], psi: numpy.typing.ArrayLike, crossings: collections.abc.Sequence[Crossing]) -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
+    @property
+    def avoidable(self) -> tuple[Crossing, ...]:
+        """
+        Crossings that a path from start to goal can do without.
+        """
+    @property
+    def crossings(self) -> tuple[Crossing, ...]:
+        """
+        In the order of time.
+        """
+    @property
+    def manipulability(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (M,) √det(JJᵀ)
+        """
+    @property
+    def min_manipulability(self) -> float:
+        """
+        The smallest √det(JJᵀ) of all samples.
+        """
+    @property
+    def min_psi(self) -> float:
+        """
+        The smallest ψ of all sets and samples; inf where no sets are known.
+        """
+    @property
+    def names(self) -> tuple[str, ...]:
+        """
+        Names of the singular sets that are known; empty where none are.
+        """
+    @property
+    def nearest_set(self) -> str | None:
+        """
+        The set with the smallest ψ; None where no sets are known.
+        """
+    @property
+    def psi(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (M, c) ψ of every set: 0 on it.
+        """
+    @property
+    def t(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (M,) [s]
+        """
+    @property
+    def unavoidable(self) -> tuple[Crossing, ...]:
+        """
+        The other crossings.
+        """
+class Trajectory:
+    """
+    Joint positions over time, N samples of n joints, and how they were found.
+
+    Between samples the acceleration is constant, or, where `cubic`, changes evenly: `sample` is
+    exact. A failed plan has no samples: its arrays are empty.
+    """
+    @staticmethod
+    def _load_text(file: str) -> Trajectory:
+        ...
+    @staticmethod
+    def load(file: str | os.PathLike[str]) -> Trajectory:
+        """
+        What `save` has written. Raises Error where the file is something else.
+        """
+    def __getstate__(self) -> tuple[int, list[float], list[float], list[float], list[float], float, str, float, float, int, int, bool, Clearance | None]:
+        ...
+    @typing.overload
+    def __init__(self, t: numpy.typing.ArrayLike, q: numpy.typing.ArrayLike, qdot: numpy.typing.ArrayLike, qddot: numpy.typing.ArrayLike, duration: typing.SupportsFloat | typing.SupportsIndex, status: str, cost: typing.SupportsFloat | typing.SupportsIndex, solve_time: typing.SupportsFloat | typing.SupportsIndex, iterations: typing.SupportsInt | typing.SupportsIndex = 0, starts: typing.SupportsInt | typing.SupportsIndex = 1, cubic: bool = False, clearance: Clearance | None = None) -> None:
+        ...
+    @typing.overload
+    def __init__(self, other: Trajectory) -> None:
+        """
+        A copy.
+        """
+    def __len__(self) -> int:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
+    def _save_text(self, file: str) -> None:
+        ...
+    def plot(self, file: str | os.PathLike[str], chain: Chain | None = None) -> pathlib.Path:
+        """
+        Writes a picture, `planning.figure.trajectory_figure`, as PNG, whole or not at all. Returns its path.
+
+        Raises Error where there is nothing to draw, the chain has other joints, or the file's name does not end in
+        .png, and MissingPackage where matplotlib is not installed.
+        """
+    def retimed(self, duration: typing.SupportsFloat | typing.SupportsIndex) -> Trajectory:
+        """
+        The same path in another duration [s], faster or slower everywhere by the same factor.
+        """
+    def sample(self, t: numpy.typing.ArrayLike) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
+        """
+        q, q̇, q̈ (M, n) at times t (M,) [s], held at the ends. Raises Error where there is nothing to sample.
+        """
+    def save(self, file: str | os.PathLike[str]) -> pathlib.Path:
+        """
+        Writes a file, whole or not at all, and returns its path. A name that ends in .csv gives the text that C++
+        reads too (planning/trajectory.hpp), without the clearance; any other name an npz file that numpy.load reads
+        without pickles.
+        """
+    @property
+    def clearance(self) -> Clearance:
+        """
+        How near to singularities the motion comes, between the samples too; None where the plan failed.
+        """
+    @property
+    def cost(self) -> float:
+        """
+        The planner's objective; nan where the plan failed.
+        """
+    @property
+    def cubic(self) -> bool:
+        """
+        Whether positions are cubic between samples, as under a Gaussian-process prior, or quadratic.
+        """
+    @property
+    def duration(self) -> float:
+        """
+        [s]; nan where the plan failed. See the planner for what it counts.
+        """
+    @property
+    def iterations(self) -> int:
+        """
+        Steps of the optimiser, of all starts.
+        """
+    @property
+    def q(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, n) [rad or m]
+        """
+    @property
+    def qddot(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, n) [rad/s² or m/s²], of the step that begins at the sample, zero in the last row;
+        where `cubic`, at the sample.
+        """
+    @property
+    def qdot(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N, n) [rad/s or m/s]
+        """
+    @property
+    def solve_time(self) -> float:
+        """
+        [s] of wall-clock time, of the optimiser alone.
+        """
+    @property
+    def starts(self) -> int:
+        """
+        First guesses tried.
+        """
+    @property
+    def status(self) -> sigmaik.planning.status.PlanStatus:
+        """
+        'optimal', a local minimum; 'feasible', within all constraints, but with something left to gain; 'failed'.
+        """
+    @property
+    def t(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (N,) [s]
+        """
+class Playback:
+    """
+    What a servo made of a planned motion: M samples, one at the begin of each cycle, and one at the
+    last cycle's end.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def joint_difference(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (M, n) planned minus the servo's [rad or m]: poses do not say where a redundant arm's elbow is.
+        """
+    @property
+    def max_joint_difference(self) -> float:
+        """
+        The largest |planned minus the servo's| of all joints [rad or m].
+        """
+    @property
+    def max_orientation_error(self) -> float:
+        """
+        The largest angle between the tip and its plan [rad].
+        """
+    @property
+    def max_position_error(self) -> float:
+        """
+        The tip's largest distance from its plan [m].
+        """
+    @property
+    def planned(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (M, n) the trajectory's positions [rad or m].
+        """
+    @property
+    def pose_error(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (M, 6) planned pose minus the servo's, [position; rotation vector], base axes [m, rad].
+        """
+    @property
+    def q(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (M, n) the servo's positions [rad or m].
+        """
+    @property
+    def qdot(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (M, n) command of the cycle that begins at the sample [rad/s or m/s]; the last row
+        repeats the one before.
+        """
+    @property
+    def status(self) -> tuple[Status, ...]:
+        """
+        M − 1, one for each cycle.
+        """
+    @property
+    def t(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (M,) [s] times of the trajectory, and those for which its end is held.
+        """
 class JointCost:
     """
     A smooth cost of joint positions, with its derivatives.
@@ -1346,7 +1624,7 @@ class SupportPlanner:
     Motions as support states under a Gaussian-process prior (Petrović et al.).
     `sigmaik.planning.stochastic` and `gradient` are what to call.
     """
-    def __init__(self, chain: Chain, cost: JointCost | None, states: typing.SupportsInt | typing.SupportsIndex, python_costs: collections.abc.Sequence[typing.Any] = []) -> None:
+    def __init__(self, chain: Chain, cost: JointCost | None, states: typing.SupportsInt | typing.SupportsIndex, python_costs: collections.abc.Sequence[typing.Any] = [], spheres: ArmSpheres | None = None, field: DistanceField | None = None) -> None:
         """
         `cost` and those of `python_costs` (value(q: (B, n)) -> (B,), gradient or not) are added up.
 
@@ -1357,6 +1635,10 @@ class SupportPlanner:
         A motion from the prior about the straight line: a first guess.
         """
     def gradient(self, start: numpy.typing.ArrayLike, goal: numpy.typing.ArrayLike, *, prior_weight: typing.SupportsFloat | typing.SupportsIndex, max_iterations: typing.SupportsInt | typing.SupportsIndex, tolerance: typing.SupportsFloat | typing.SupportsIndex, guess: SupportStates | None = None) -> SupportStates:
+        ...
+    def plan_gradient(self, start: numpy.typing.ArrayLike, goal: numpy.typing.ArrayLike, *, prior_weight: typing.SupportsFloat | typing.SupportsIndex = 10.0, max_iterations: typing.SupportsInt | typing.SupportsIndex = 100, tolerance: typing.SupportsFloat | typing.SupportsIndex = 0.0001, restarts: typing.SupportsInt | typing.SupportsIndex = 8, duration: typing.SupportsFloat | typing.SupportsIndex | None = None) -> Trajectory:
+        ...
+    def plan_stochastic(self, start: numpy.typing.ArrayLike, goal: numpy.typing.ArrayLike, *, samples: typing.SupportsInt | typing.SupportsIndex = 10, max_iterations: typing.SupportsInt | typing.SupportsIndex = 30, deviation: typing.SupportsFloat | typing.SupportsIndex = 0.5, decay: typing.SupportsFloat | typing.SupportsIndex = 0.98, temperature: typing.SupportsFloat | typing.SupportsIndex = 0.1, prior_weight: typing.SupportsFloat | typing.SupportsIndex = 10.0, tolerance: typing.SupportsFloat | typing.SupportsIndex = 0.001, seed: typing.SupportsInt | typing.SupportsIndex = 0, refine: bool = False, duration: typing.SupportsFloat | typing.SupportsIndex | None = None) -> Trajectory:
         ...
     def stochastic(self, start: numpy.typing.ArrayLike, goal: numpy.typing.ArrayLike, *, samples: typing.SupportsInt | typing.SupportsIndex, max_iterations: typing.SupportsInt | typing.SupportsIndex, deviation: typing.SupportsFloat | typing.SupportsIndex, decay: typing.SupportsFloat | typing.SupportsIndex, temperature: typing.SupportsFloat | typing.SupportsIndex, prior_weight: typing.SupportsFloat | typing.SupportsIndex, tolerance: typing.SupportsFloat | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> SupportStates:
         ...
@@ -1403,9 +1685,14 @@ class TimeOptimal:
     Time-optimal motions of one arm with one cost, after Beck et al. (2022), by an interior-point
     method made for double integrators. `sigmaik.planning.time_optimal` is what to call.
     """
-    def __init__(self, chain: Chain, cost: JointCost | None, *, nodes: typing.SupportsInt | typing.SupportsIndex = 30, time_weight: typing.SupportsFloat | typing.SupportsIndex = 1.0, effort_weight: typing.SupportsFloat | typing.SupportsIndex = 1.0, tolerance: typing.SupportsFloat | typing.SupportsIndex = 1e-09, max_iterations: typing.SupportsInt | typing.SupportsIndex = 500, between_nodes: bool = True, restarts: bool = True) -> None:
+    def __init__(self, chain: Chain, cost: JointCost | None, *, nodes: typing.SupportsInt | typing.SupportsIndex = 30, time_weight: typing.SupportsFloat | typing.SupportsIndex = 1.0, effort_weight: typing.SupportsFloat | typing.SupportsIndex = 1.0, tolerance: typing.SupportsFloat | typing.SupportsIndex = 1e-09, max_iterations: typing.SupportsInt | typing.SupportsIndex = 500, between_nodes: bool = True, restarts: bool = True, clearance_width: typing.SupportsFloat | typing.SupportsIndex = 400.0, sets: SingularSets | None = None, spheres: ArmSpheres | None = None, field: DistanceField | None = None) -> None:
         """
         Raises Error where an option is out of its range.
+        """
+    def plan(self, start: numpy.typing.ArrayLike, goal: numpy.typing.ArrayLike, start_velocity: numpy.typing.ArrayLike | None = None, goal_velocity: numpy.typing.ArrayLike | None = None) -> Trajectory:
+        """
+        A motion with its clearance, and, where it crosses a singular set that it need not, the better of it and of
+        one from the other side.
         """
     def solve(self, start: numpy.typing.ArrayLike, goal: numpy.typing.ArrayLike, start_velocity: numpy.typing.ArrayLike | None = None, goal_velocity: numpy.typing.ArrayLike | None = None, bend: numpy.typing.ArrayLike | None = None) -> TimeOptimalResult:
         """
@@ -1438,73 +1725,163 @@ class CartRegion:
         """
         1: the law passes above λ+; −1: below λ−.
         """
-class CartLaw:
+class CartMeasures:
     """
-    Answer of cart_law().
+    What motions of a cart with one axis and with two have in common: M samples, evenly spaced
+    in time.
     """
     @property
-    def corner_x(self) -> list[float]:
+    def admissible(self) -> bool:
         """
-        [m] there.
+        No sample is within the radius.
         """
     @property
-    def corners(self) -> list[float]:
+    def clearance(self) -> float:
         """
-        [samples] where the string bends, and its ends.
+        [m] the point's least distance from the first joint's axis, between the samples too.
+        """
+    @property
+    def duration(self) -> float:
+        """
+        [s] from the first to the last sample.
         """
     @property
     def energy(self) -> float:
         """
-        [m²] Σ (Δx)².
+        [m²] Σ |Δ|² of the cart; with a corner between samples, of the steps that it makes, each over its
+        part of a sample.
         """
     @property
-    def lower(self) -> numpy.typing.NDArray[numpy.float64]:
+    def flange_xy(self) -> numpy.typing.NDArray[numpy.float64]:
         """
-        (M,) [m] λ−, ∞ where nothing is forbidden.
-        """
-    @property
-    def multipliers(self) -> numpy.typing.NDArray[numpy.float64]:
-        """
-        (M,) [m] μ.
+        (M, 2) [m] the path that was given.
         """
     @property
-    def regions(self) -> list[CartRegion]:
+    def inside(self) -> int:
         """
-        Connected parts of the forbidden region.
+        Samples within the radius.
         """
     @property
-    def strings(self) -> int:
+    def margin(self) -> float:
         """
-        Taut strings drawn.
+        [m] that was added to the radius in planning.
+        """
+    @property
+    def radius(self) -> float:
+        """
+        [m] of the forbidden cylinder, without the margin.
+        """
+    @property
+    def t(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (M,) [s] of the samples.
+        """
+    @property
+    def time_inside(self) -> float:
+        """
+        [s] of the samples within the radius.
         """
     @property
     def turn(self) -> float:
         """
-        [rad] of the point's azimuth.
+        [rad] by which the point's azimuth turns, seen from the axis: which way round, and how often.
+        """
+class CartMotion(CartMeasures):
+    """
+    Where the cart is at each of M samples evenly spaced in time, and what it had to keep out of. Straight between
+    samples, but where `corners` has one between two of them: at the tip of a forbidden region.
+    """
+    def __repr__(self) -> str:
+        ...
+    def sample(self, t: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        x (…) [m] at times t (…) [s], held at the ends.
+        """
+    @property
+    def corner_x(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (K,) [m] there.
+        """
+    @property
+    def corners(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (K,) [samples] where the law bends, and its ends.
+        """
+    @property
+    def iterations(self) -> int:
+        """
+        Steps of the gradient descent, or taut strings drawn.
+        """
+    @property
+    def lower(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (M,) [m] λ−: between it and `upper` the cart is not allowed, at radius + margin; inf where it is free.
+        """
+    @property
+    def max_acceleration(self) -> float:
+        """
+        [m/s²], the largest second difference over the samples.
+        """
+    @property
+    def max_speed(self) -> float:
+        """
+        [m/s]
+        """
+    @property
+    def method(self) -> str:
+        """
+        'exact' or 'gradient'; 'given' for a law that was only looked at.
+        """
+    @property
+    def multipliers(self) -> numpy.typing.NDArray[numpy.float64] | None:
+        """
+        (M,) [m] μ_i = 2x_i − x_{i−1} − x_{i+1} of the exact law: > 0 only where it is held up by λ+ or the cart's
+        range, < 0 only where it is held down, 0 elsewhere (not where the acceleration is limited); else None.
+        """
+    @property
+    def regions(self) -> tuple[CartRegion, ...]:
+        """
+        Connected parts of the forbidden region, with their sides; empty where `method` is not 'exact'.
+        """
+    @property
+    def sides(self) -> numpy.typing.NDArray[numpy.int8]:
+        """
+        (M,) 1 where the cart is above a forbidden interval, −1 below, 0 where there is none, or it is inside.
         """
     @property
     def upper(self) -> numpy.typing.NDArray[numpy.float64]:
         """
-        (M,) [m] λ+, −∞ where nothing is forbidden.
+        (M,) [m] λ+; −inf where the cart is free.
         """
     @property
     def x(self) -> numpy.typing.NDArray[numpy.float64]:
         """
-        (M,) [m]
+        (M,) [m] of the cart.
         """
-class PlaneCartLaw:
+class PlaneCartMotion(CartMeasures):
     """
-    Answer of plane_cart_law().
+    Where a cart with two axes is at each of M samples evenly spaced in time, straight between them.
     """
+    def __repr__(self) -> str:
+        ...
+    def sample(self, t: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        xy (…, 2) [m] at times t (…) [s], held at the ends.
+        """
     @property
-    def c(self) -> numpy.typing.NDArray[numpy.float64]:
+    def farthest(self) -> float:
         """
-        (M, 2) [m]
+        [m] the point's largest distance from the axis.
         """
     @property
-    def energy(self) -> float:
+    def max_acceleration(self) -> numpy.typing.NDArray[numpy.float64]:
         """
-        [m²] Σ |Δc|².
+        (2,) [m/s²] of each axis, the largest second differences over the samples.
+        """
+    @property
+    def max_speed(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (2,) [m/s] of each axis.
         """
     @property
     def programs(self) -> int:
@@ -1512,9 +1889,10 @@ class PlaneCartLaw:
         Quadratic programs solved.
         """
     @property
-    def push(self) -> numpy.typing.NDArray[numpy.float64]:
+    def push(self) -> numpy.typing.NDArray[numpy.float64] | None:
         """
-        (M,) [m]
+        (M,) [m] ≥ 0, |2c_i − c_{i−1} − c_{i+1}| where the cart c touches the disc about the point, away from it,
+        else 0. At an optimum without limits the cart bends nowhere else. None for a motion that was only looked at.
         """
     @property
     def starts(self) -> int:
@@ -1522,10 +1900,14 @@ class PlaneCartLaw:
         First guesses tried.
         """
     @property
-    def turn(self) -> float:
+    def xy(self) -> numpy.typing.NDArray[numpy.float64]:
         """
-        [rad] of the point's azimuth.
+        (M, 2) [m] of the cart.
         """
+def admissible_guess(flange_xy: numpy.typing.ArrayLike, start: typing.SupportsFloat | typing.SupportsIndex, end: typing.SupportsFloat | typing.SupportsIndex, radius: typing.SupportsFloat | typing.SupportsIndex, *, lower: typing.SupportsFloat | typing.SupportsIndex = ..., upper: typing.SupportsFloat | typing.SupportsIndex = ..., margin: typing.SupportsFloat | typing.SupportsIndex = 0.0, turn: typing.SupportsFloat | typing.SupportsIndex | None = None, duration: typing.SupportsFloat | typing.SupportsIndex = 1.0, max_speed: typing.SupportsFloat | typing.SupportsIndex = ..., max_acceleration: typing.SupportsFloat | typing.SupportsIndex = ..., at_rest: bool = False) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    A first guess (M,) of the descent that jumps past the forbidden region, on the sides of the exact law.
+    """
 class DistanceField:
     """
     Signed distances [m] to obstacles on a regular grid, interpolated trilinearly: positive in
@@ -1623,13 +2005,33 @@ def cart_descent(lower: numpy.typing.ArrayLike, upper: numpy.typing.ArrayLike, g
     """
     Gradient descent (10) from a guess (M,) [m]: the law and the number of iterations.
     """
-def cart_law(flange_xy: numpy.typing.ArrayLike, start: typing.SupportsFloat | typing.SupportsIndex, end: typing.SupportsFloat | typing.SupportsIndex, radius: typing.SupportsFloat | typing.SupportsIndex, *, lower: typing.SupportsFloat | typing.SupportsIndex, upper: typing.SupportsFloat | typing.SupportsIndex, margin: typing.SupportsFloat | typing.SupportsIndex, turn: typing.SupportsFloat | typing.SupportsIndex | None, duration: typing.SupportsFloat | typing.SupportsIndex, max_speed: typing.SupportsFloat | typing.SupportsIndex, max_acceleration: typing.SupportsFloat | typing.SupportsIndex, at_rest: bool) -> CartLaw:
+def cart_motion(flange_xy: numpy.typing.ArrayLike, start: typing.SupportsFloat | typing.SupportsIndex, end: typing.SupportsFloat | typing.SupportsIndex, radius: typing.SupportsFloat | typing.SupportsIndex, *, lower: typing.SupportsFloat | typing.SupportsIndex = ..., upper: typing.SupportsFloat | typing.SupportsIndex = ..., margin: typing.SupportsFloat | typing.SupportsIndex = 0.0, turn: typing.SupportsFloat | typing.SupportsIndex | None = None, duration: typing.SupportsFloat | typing.SupportsIndex = 1.0, max_speed: typing.SupportsFloat | typing.SupportsIndex = ..., max_acceleration: typing.SupportsFloat | typing.SupportsIndex = ..., at_rest: bool = False) -> CartMotion:
     """
-    The cart's law of the least energy. `sigmaik.planning.cart_motion` is what to call.
+    The exact law. `sigmaik.planning.cart_motion` is what to call.
+    """
+def cart_motion_by_descent(flange_xy: numpy.typing.ArrayLike, start: typing.SupportsFloat | typing.SupportsIndex, end: typing.SupportsFloat | typing.SupportsIndex, radius: typing.SupportsFloat | typing.SupportsIndex, *, alpha: typing.SupportsFloat | typing.SupportsIndex, step: typing.SupportsFloat | typing.SupportsIndex, max_iterations: typing.SupportsInt | typing.SupportsIndex, guess: numpy.typing.ArrayLike | None = None, margin: typing.SupportsFloat | typing.SupportsIndex = 0.0, duration: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> CartMotion:
+    """
+    The law of the gradient descent. `sigmaik.planning.cart_motion` is what to call.
+    """
+def clearance(chain: Chain, sets: SingularSets | None, t: numpy.typing.ArrayLike, q: numpy.typing.ArrayLike, *, width: typing.SupportsFloat | typing.SupportsIndex = 400.0) -> Clearance:
+    """
+    Clearance of the configurations q (M, n) at increasing times t (M,) [s].
+
+    sets: the arm's singular sets, or None.
+    width: η₂ [1/rad²]: sets of codimension above 1 count as crossed where ψ < 1/(2 width) between ends that are
+        both outside.
     """
 def collision_cost(spheres: ArmSpheres, field: DistanceField, clearance: typing.SupportsFloat | typing.SupportsIndex = 0.05, weight: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> JointCost:
     """
     weight · Σ c(d) over the spheres that move, d the signed distance of their surfaces to the obstacles.
+    """
+def evaluate_cart_motion(flange_xy: numpy.typing.ArrayLike, x: numpy.typing.ArrayLike, radius: typing.SupportsFloat | typing.SupportsIndex, *, margin: typing.SupportsFloat | typing.SupportsIndex = 0.0, duration: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> CartMotion:
+    """
+    Any law x (M,) [m] of the cart, such as the linear one, looked at as `cart_motion` does.
+    """
+def evaluate_cart_motion_plane(flange_xy: numpy.typing.ArrayLike, xy: numpy.typing.ArrayLike, radius: typing.SupportsFloat | typing.SupportsIndex, *, margin: typing.SupportsFloat | typing.SupportsIndex = 0.0, duration: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> PlaneCartMotion:
+    """
+    Any motion xy (M, 2) [m] of the cart, such as the straight one, looked at as `cart_motion_plane` does.
     """
 def evaluate_index(chain: Chain, q: numpy.typing.ArrayLike, index: str, k: numpy.typing.ArrayLike = 6.0, length_scale: typing.SupportsFloat | typing.SupportsIndex = 1.0, threads: typing.SupportsInt | typing.SupportsIndex = 1, gradients: bool = True) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
     """
@@ -1682,9 +2084,25 @@ def min_distance(spheres: ArmSpheres, field: DistanceField, q: numpy.typing.Arra
     """
     The least signed distance [m] from a sphere that moves to the obstacles at q (n,), or (B,) at q (B, n).
     """
-def plane_cart_law(flange_xy: numpy.typing.ArrayLike, start: numpy.typing.ArrayLike, end: numpy.typing.ArrayLike, radius: typing.SupportsFloat | typing.SupportsIndex, *, lower: numpy.typing.ArrayLike, upper: numpy.typing.ArrayLike, margin: typing.SupportsFloat | typing.SupportsIndex, max_radius: typing.SupportsFloat | typing.SupportsIndex, turn: typing.SupportsFloat | typing.SupportsIndex | None, duration: typing.SupportsFloat | typing.SupportsIndex, max_speed: numpy.typing.ArrayLike, max_acceleration: numpy.typing.ArrayLike, at_rest: bool) -> PlaneCartLaw:
+def plane_cart_motion(flange_xy: numpy.typing.ArrayLike, start: numpy.typing.ArrayLike, end: numpy.typing.ArrayLike, radius: typing.SupportsFloat | typing.SupportsIndex, *, lower: numpy.typing.ArrayLike, upper: numpy.typing.ArrayLike, margin: typing.SupportsFloat | typing.SupportsIndex = 0.0, max_radius: typing.SupportsFloat | typing.SupportsIndex = ..., turn: typing.SupportsFloat | typing.SupportsIndex | None = None, duration: typing.SupportsFloat | typing.SupportsIndex = 1.0, max_speed: numpy.typing.ArrayLike = ..., max_acceleration: numpy.typing.ArrayLike = ..., at_rest: bool = False) -> PlaneCartMotion:
     """
-    The motion of a cart with two axes. `sigmaik.planning.cart_motion_plane` is what to call.
+    The motion with two axes. `sigmaik.planning.cart_motion_plane` is what to call.
+    """
+def play(trajectory: Trajectory, servo: Servo, *, settle: typing.SupportsFloat | typing.SupportsIndex = 0.5) -> Playback:
+    """
+    Plays a planned motion through a servo that stands at its start, as poses with feed-forward twists, at the
+    servo's dt.
+
+    In the cycle from t to t + dt the target is the pose planned for t, and the feed-forward twist is J(q) q̇ of
+    the plan in the middle of the cycle. A cycle of constant q̇ leaves the error ½ dt² J̇ q̇, and the gains keep
+    the sum of these errors to ½ dt |J̇ q̇| / gain: micrometres at 1 kHz. The soft start costs more. The servo
+    holds its limits and treats singularities by its own rule, so it may leave the plan; its gains bring it back.
+    The servo's history goes on: call `servo.reset` before.
+
+    settle: [s] for which the last pose is held.
+
+    Raises Error where the trajectory is empty or has other joints, the servo stands elsewhere (1e-6 rad or m), or
+    settle is not finite or negative.
     """
 def pose_error(current: typing.Any, target: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
     """
@@ -1709,6 +2127,10 @@ def rotation_exp(vector: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.f
 def rotation_log(rotation: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
     """
     Axis times angle [rad] (3,) of a 3×3 rotation, angle in [0, π].
+    """
+def scaled_cost(factor: typing.SupportsFloat | typing.SupportsIndex, cost: JointCost) -> JointCost:
+    """
+    factor · cost.
     """
 def rules() -> tuple[type[Method], ...]:
     """

@@ -10,11 +10,13 @@
 #include <Eigen/Core>
 
 #include <sigmaik/planning/cart.hpp>
+#include <sigmaik/planning/cart_motion.hpp>
 
 #include "random.hpp"
 
 using namespace sigmaik;
 using namespace sigmaik::planning;
+using Eigen::VectorXd;
 using test::Random;
 
 namespace {
@@ -43,6 +45,42 @@ PlanarPath wave(Random& random, int samples, double waves, double size) {
   return path;
 }
 
+// The library's functions, which take and give std::vectors, on Eigen's.
+VectorXd vector_of(const std::vector<double>& v) {
+  return Eigen::Map<const VectorXd>(v.data(), static_cast<Eigen::Index>(v.size()));
+}
+std::vector<double> list_of(const VectorXd& v) { return {v.begin(), v.end()}; }
+
+struct Law : CartLaw {
+  VectorXd x, lower, upper, multipliers;
+};
+
+Law law_of(const PlanarPath& path, double start, double end, double radius, const CartOptions& options = {}) {
+  const CartLaw law = cart_law(path, start, end, radius, options);
+  return {law, vector_of(law.x), vector_of(law.lower), vector_of(law.upper), vector_of(law.multipliers)};
+}
+
+void intervals_of(const PlanarPath& path, double radius, VectorXd& lower, VectorXd& upper) {
+  std::vector<double> low, high;
+  forbidden_intervals(path, radius, low, high);
+  lower = vector_of(low);
+  upper = vector_of(high);
+}
+
+void string_of(const VectorXd& at, const VectorXd& lower, const VectorXd& upper, VectorXd& x,
+               std::vector<int>& corners) {
+  std::vector<double> out;
+  taut_string(list_of(at), list_of(lower), list_of(upper), out, corners);
+  x = vector_of(out);
+}
+
+int descent_of(const VectorXd& lower, const VectorXd& upper, VectorXd& x, const CartDescent& options) {
+  std::vector<double> law = list_of(x);
+  const int iterations = cart_descent(list_of(lower), list_of(upper), law, options);
+  x = vector_of(law);
+  return iterations;
+}
+
 double second_difference(const VectorXd& x, Eigen::Index i) { return 2.0 * x[i] - x[i - 1] - x[i + 1]; }
 
 double turn_of(const PlanarPath& path, const VectorXd& x) {
@@ -66,7 +104,7 @@ TEST_CASE("the two experiments: energy, contact, speed") {
       {line(0.26036729999, 0.19588536, 0.81570562, -0.30245277, 5068), 24.359793e-6, 0.7781139, 2362, 3605, 0.794411,
        2.31573e-3}};
   for (const Reference& r : references) {
-    const CartLaw law = cart_law(r.path, 0.5, 0.75, 0.2, {.lower = 0.0, .upper = 1.0, .turn = 2.47, .duration = 200.0});
+    const Law law = law_of(r.path, 0.5, 0.75, 0.2, {.lower = 0.0, .upper = 1.0, .turn = 2.47, .duration = 200.0});
     CHECK(law.energy == doctest::Approx(r.energy).epsilon(2e-8));
     CHECK((law.x.tail(5067) - law.x.head(5067)).squaredNorm() == doctest::Approx(law.energy).epsilon(1e-12));
     CHECK(law.x.maxCoeff() == doctest::Approx(r.top).epsilon(1e-7));
@@ -102,7 +140,7 @@ TEST_CASE("a taut string satisfies the conditions of optimality in random tubes"
     lower[0] = upper[0] = random.normal();
     lower[n - 1] = upper[n - 1] = middle;
     std::vector<int> corners;
-    taut_string(at, lower, upper, x, corners);
+    string_of(at, lower, upper, x, corners);
     CHECK(corners.front() == 0);
     CHECK(corners.back() == n - 1);
     CHECK((x.array() >= lower.array()).all());
@@ -133,7 +171,7 @@ TEST_CASE("a taut string is what a solver of quadratic programs finds") {
     lower[0] = upper[0] = 0.0;
     lower[n - 1] = upper[n - 1] = middle;
     std::vector<int> corners;
-    taut_string(VectorXd::LinSpaced(n, 0, n - 1), lower, upper, x, corners);
+    string_of(VectorXd::LinSpaced(n, 0, n - 1), lower, upper, x, corners);
     // Gauss-Seidel with projection: slow, simple, and convergent for this problem.
     VectorXd y = 0.5 * (lower + upper);
     for (int sweep = 0; sweep < 20000; ++sweep) {
@@ -160,7 +198,7 @@ TEST_CASE("the law keeps out of the region and is optimal for its sides, over th
     if (random.chance(0.5)) options.lower = -1.0, options.upper = 1.0;
     if (random.chance(0.3)) options.margin = 0.01;
     try {
-      const CartLaw law = cart_law(path, start, end, r, options);
+      const Law law = law_of(path, start, end, r, options);
       ++planned;
       const double keep = r + options.margin;
       CHECK(law.x[0] == start);
@@ -193,8 +231,8 @@ TEST_CASE("the law keeps out of the region and is optimal for its sides, over th
       ++refused;
       if (std::isnan(e.feasible_radius())) continue;
       CHECK(e.feasible_radius() < r);
-      CHECK_NOTHROW(cart_law(path, start, end, e.feasible_radius(), options));
-      CHECK_THROWS_AS(cart_law(path, start, end, e.feasible_radius() + 1e-9, options), CartError);
+      CHECK_NOTHROW(law_of(path, start, end, e.feasible_radius(), options));
+      CHECK_THROWS_AS(law_of(path, start, end, e.feasible_radius() + 1e-9, options), CartError);
     }
   }
   CHECK(planned > 500);
@@ -214,7 +252,7 @@ TEST_CASE("branch and bound finds what going through all sides finds") {
     // Parts of the region over the samples, and the least energy over all their sides: tubes of samples alone, so only
     // paths whose best string touches no tip can be compared.
     VectorXd low, high;
-    forbidden_intervals(path, r, low, high);
+    intervals_of(path, r, low, high);
     std::vector<std::pair<int, int>> parts;
     for (int i = 0; i < m; ++i) {
       if (low[i] > high[i]) continue;
@@ -238,14 +276,14 @@ TEST_CASE("branch and bound finds what going through all sides finds") {
       lower[0] = upper[0] = start;
       lower[m - 1] = upper[m - 1] = end;
       std::vector<int> corners;
-      taut_string(VectorXd::LinSpaced(m, 0, m - 1), lower, upper, x, corners);
+      string_of(VectorXd::LinSpaced(m, 0, m - 1), lower, upper, x, corners);
       if (turn < 1e8 && std::abs(turn_of(path, x) - turn) > kPi) continue;
       best = std::min(best, (x.tail(m - 1) - x.head(m - 1)).squaredNorm());
     }
     CartOptions options;
     if (turn < 1e8) options.turn = turn;
     try {
-      const CartLaw law = cart_law(path, start, end, r, options);
+      const Law law = law_of(path, start, end, r, options);
       bool tip = false;
       for (const double at : law.corners) tip = tip || at != std::floor(at);
       if (law.regions.size() != parts.size()) continue;  // one lies between samples
@@ -271,19 +309,19 @@ TEST_CASE("lengths have no unit, and the path may be run backwards or mirrored")
     const PlanarPath path = wave(random, m, random.uniform(0.2, 2.0), random.uniform(0.2, 1.0));
     const double start = random.uniform(-1, 1), end = random.uniform(-1, 1), r = random.uniform(0.02, 0.2);
     try {
-      const CartLaw law = cart_law(path, start, end, r);
+      const Law law = law_of(path, start, end, r);
       ++compared;
       const double scale = random.decades(-3, 3), size = law.x.cwiseAbs().maxCoeff() + r;
-      const CartLaw scaled = cart_law(scale * path, scale * start, scale * end, scale * r);
+      const Law scaled = law_of(scale * path, scale * start, scale * end, scale * r);
       CHECK((scaled.x - scale * law.x).cwiseAbs().maxCoeff() < 1e-11 * scale * size);
-      const CartLaw reversed = cart_law(path.colwise().reverse(), end, start, r);
+      const Law reversed = law_of(path.colwise().reverse(), end, start, r);
       CHECK((reversed.x.reverse() - law.x).cwiseAbs().maxCoeff() < 1e-11 * size);
       CHECK(reversed.turn == doctest::Approx(-law.turn).epsilon(1e-9));
-      const CartLaw mirrored = cart_law(-path, -start, -end, r);
+      const Law mirrored = law_of(-path, -start, -end, r);
       CHECK((mirrored.x + law.x).cwiseAbs().maxCoeff() < 1e-11 * size);
       PlanarPath flipped = path;
       flipped.col(1) *= -1.0;
-      CHECK((cart_law(flipped, start, end, r).x - law.x).cwiseAbs().maxCoeff() < 1e-11 * size);
+      CHECK((law_of(flipped, start, end, r).x - law.x).cwiseAbs().maxCoeff() < 1e-11 * size);
     } catch (const CartError&) {
     }
   }
@@ -298,7 +336,7 @@ TEST_CASE("a larger circle costs more, and any other law is faster") {
     const double start = path(0, 0) + random.uniform(-1, 1), end = path(199, 0) + random.uniform(-1, 1);
     double energy = 0.0;
     for (const double r : {0.02, 0.05, 0.1, 0.2, 0.25}) {
-      const CartLaw law = cart_law(path, start, end, r);
+      const Law law = law_of(path, start, end, r);
       CHECK(law.energy >= energy * (1.0 - 1e-12));
       energy = law.energy;
       // Least top speed: nobody keeps on this side at a lower one.
@@ -307,10 +345,10 @@ TEST_CASE("a larger circle costs more, and any other law is faster") {
         top = std::max(top, std::abs(law.corner_x[c + 1] - law.corner_x[c]) / (law.corners[c + 1] - law.corners[c]));
       }
       CartOptions slow{.duration = 199.0, .max_speed = top * (1.0 + 1e-9)};
-      CHECK(cart_law(path, start, end, r, slow).energy == doctest::Approx(law.energy).epsilon(1e-9));
+      CHECK(law_of(path, start, end, r, slow).energy == doctest::Approx(law.energy).epsilon(1e-9));
       slow.max_speed = top * (1.0 - 1e-6);
       try {
-        CHECK(cart_law(path, start, end, r, slow).regions[0].side == -law.regions[0].side);
+        CHECK(law_of(path, start, end, r, slow).regions[0].side == -law.regions[0].side);
       } catch (const CartError& e) {
         CHECK(e.fault() == CartFault::Speed);
       }
@@ -328,14 +366,14 @@ TEST_CASE("limits of speed and acceleration are kept, at tips between samples to
     const double duration = m - 1;
     CartOptions options{.duration = duration};
     try {
-      const CartLaw free = cart_law(path, start, end, r, options);
+      const Law free = law_of(path, start, end, r, options);
       double top = 0.0;
       for (Eigen::Index i = 1; i + 1 < m; ++i) top = std::max(top, std::abs(second_difference(free.x, i)));
       options.max_acceleration = top * random.uniform(0.2, 1.0) + 1e-9;
       options.max_speed = random.chance(0.5) ? kInfinity
                                              : 3.0 * (free.x.tail(m - 1) - free.x.head(m - 1)).cwiseAbs().maxCoeff();
       options.at_rest = random.chance(0.5);
-      const CartLaw law = cart_law(path, start, end, r, options);
+      const Law law = law_of(path, start, end, r, options);
       ++limited;
       CHECK(law.x[0] == start);
       CHECK(law.x[m - 1] == end);
@@ -374,7 +412,7 @@ TEST_CASE("tips and whole regions between samples are kept out of") {
   for (int k = 0; k < 50; ++k) {
     const double y1 = -0.2002 - 1e-4 * k;
     const PlanarPath path = line(0.0, 0.1, 0.0, y1, 60);
-    const CartLaw law = cart_law(path, 0.3, -0.6, 0.2);
+    const Law law = law_of(path, 0.3, -0.6, 0.2);
     REQUIRE(law.regions.size() == 1);
     const double tip = law.regions[0].last;
     std::size_t after = 0;
@@ -389,7 +427,7 @@ TEST_CASE("tips and whole regions between samples are kept out of") {
   // From y = 1 to y = −1 in one step.
   PlanarPath leap(4, 2);
   leap << 0, 1, 0, 1, 0, -1, 0, -1;
-  const CartLaw law = cart_law(leap, 0.05, 0.05, 0.2);
+  const Law law = law_of(leap, 0.05, 0.05, 0.2);
   REQUIRE(law.regions.size() == 1);
   CHECK(law.regions[0].side == 1);
   CHECK(law.regions[0].first == doctest::Approx(1.4));
@@ -400,7 +438,7 @@ TEST_CASE("tips and whole regions between samples are kept out of") {
 TEST_CASE("what cannot be done is told apart") {
   const auto fault = [](const PlanarPath& path, double start, double end, double r, const CartOptions& options = {}) {
     try {
-      cart_law(path, start, end, r, options);
+      law_of(path, start, end, r, options);
     } catch (const CartError& e) {
       CHECK(std::string(e.what()).find(to_string(e.fault())) != std::string::npos);
       return std::pair{e.fault(), e.feasible_radius()};
@@ -425,8 +463,8 @@ TEST_CASE("what cannot be done is told apart") {
   std::tie(why, radius) = fault(through, 0.02, 0.02, 0.2, {.turn = 9.0});
   CHECK(why == CartFault::Winding);
   CHECK(std::isnan(radius));
-  CHECK(cart_law(through, 0.02, 0.02, 0.2, {.turn = kPi}).regions[0].side == 1);
-  CHECK(cart_law(through, 0.02, 0.02, 0.2, {.turn = -kPi}).regions[0].side == -1);
+  CHECK(law_of(through, 0.02, 0.02, 0.2, {.turn = kPi}).regions[0].side == 1);
+  CHECK(law_of(through, 0.02, 0.02, 0.2, {.turn = -kPi}).regions[0].side == -1);
   std::tie(why, radius) = fault(through, 0.02, 0.02, 0.2, {.upper = 0.12, .turn = kPi});
   CHECK(why == CartFault::Range);
   std::tie(why, radius) = fault(through, 0.0, 0.0, 0.2, {.duration = 1.0, .max_speed = 0.2});
@@ -438,27 +476,27 @@ TEST_CASE("what cannot be done is told apart") {
   std::tie(why, radius) = fault(line(0.0, 0.5, 0.0, 0.5, 2), 0.0, 1.0, 0.2, {.max_acceleration = 0.2, .at_rest = true});
   CHECK(why == CartFault::Acceleration);
   // A part of the region that begins at a tip between the last two samples: which side it is on is told by the end.
-  CHECK(cart_law(line(0.0, 0.5, 0.0, 0.15, 8), -0.9, 0.16, 0.2).regions[0].side == 1);
-  CHECK(cart_law(line(0.0, 0.5, 0.0, 0.15, 8), 0.9, -0.16, 0.2).regions[0].side == -1);
+  CHECK(law_of(line(0.0, 0.5, 0.0, 0.15, 8), -0.9, 0.16, 0.2).regions[0].side == 1);
+  CHECK(law_of(line(0.0, 0.5, 0.0, 0.15, 8), 0.9, -0.16, 0.2).regions[0].side == -1);
 
   Random random(8);
   const PlanarPath many = wave(random, 2000, 30.0, 1.0);
-  const double natural = cart_law(many, 1.5, -1.5, 0.3).turn;
+  const double natural = law_of(many, 1.5, -1.5, 0.3).turn;
   std::tie(why, radius) = fault(many, 1.5, -1.5, 0.3, {.turn = natural + 8.0 * kPi, .max_strings = 100});
   CHECK(why == CartFault::Undecided);
 
-  CHECK_THROWS_AS(cart_law(over, 0.5, 0.5, 0.0), Error);
-  CHECK_THROWS_AS(cart_law(over, 0.5, 2.0, 0.2, {.upper = 1.0}), Error);
-  CHECK_THROWS_AS(cart_law(over.topRows(1), 0.5, 0.5, 0.2), Error);
-  CHECK_THROWS_AS(cart_law(over, 0.5, std::nan(""), 0.2), Error);
-  CHECK_THROWS_AS(cart_law(over, 0.5, 0.5, 0.2, {.margin = -1.0}), Error);
+  CHECK_THROWS_AS(law_of(over, 0.5, 0.5, 0.0), Error);
+  CHECK_THROWS_AS(law_of(over, 0.5, 2.0, 0.2, {.upper = 1.0}), Error);
+  CHECK_THROWS_AS(law_of(over.topRows(1), 0.5, 0.5, 0.2), Error);
+  CHECK_THROWS_AS(law_of(over, 0.5, std::nan(""), 0.2), Error);
+  CHECK_THROWS_AS(law_of(over, 0.5, 0.5, 0.2, {.margin = -1.0}), Error);
 }
 
 TEST_CASE("gradient descent: a step is down the slope of (10), and ends where H is zero") {
   Random random(7);
   const PlanarPath path = wave(random, 40, 1.0, 0.3);
   VectorXd low, high;
-  forbidden_intervals(path, 0.25, low, high);
+  intervals_of(path, 0.25, low, high);
   const double alpha = 0.01, step = 1e-3;
   const auto cost = [&](const VectorXd& x) {  // lengths in mm
     double sum = 0.0;
@@ -470,8 +508,8 @@ TEST_CASE("gradient descent: a step is down the slope of (10), and ends where H 
   };
   const VectorXd x = 0.2 * random.vector(40);
   VectorXd moved = x;
-  CHECK(cart_descent(low, high, moved,
-                     {.alpha = alpha, .step = step, .max_iterations = 1, .until_admissible = false}) == 1);
+  CHECK(descent_of(low, high, moved, {.alpha = alpha, .step = step, .max_iterations = 1, .until_admissible = false}) ==
+        1);
   for (Eigen::Index i = 1; i + 1 < 40; ++i) {
     VectorXd up = 1e3 * x, down = 1e3 * x;
     up[i] += 1e-4;
@@ -481,9 +519,86 @@ TEST_CASE("gradient descent: a step is down the slope of (10), and ends where H 
   CHECK(moved[0] == x[0]);
 
   const PlanarPath straight = line(0.0, 0.5, 0.0, -0.5, 3000);
-  forbidden_intervals(straight, 0.2, low, high);
+  intervals_of(straight, 0.2, low, high);
   VectorXd law = VectorXd::LinSpaced(3000, 0.1, 0.15);
-  const int done = cart_descent(low, high, law, {});
+  const int done = descent_of(low, high, law, {});
   CHECK(done < 53707);
   CHECK(((law.array() >= high.array()) || (law.array() <= low.array())).all());
+}
+
+TEST_CASE("motions of the cart are measured: energy, clearance, turn, limits, times") {
+  const PlanarPath path = line(0.0, 0.5, 0.0, -0.5, 101);
+  const CartOptions options{.margin = 0.05, .duration = 4.0};
+  const CartMotion motion = cart_motion(path, 0.1, 0.15, 0.2, options);
+  const Law law = law_of(path, 0.1, 0.15, 0.2, options);
+  CHECK(motion.method == "exact");
+  CHECK(motion.x == list_of(law.x));
+  CHECK(motion.energy == doctest::Approx(law.energy).epsilon(1e-12));
+  CHECK(motion.turn == doctest::Approx(law.turn).epsilon(1e-9));
+  CHECK(motion.admissible);
+  CHECK(motion.inside == 0);
+  CHECK(motion.clearance >= 0.25 - 1e-4);
+  CHECK(motion.clearance < 0.2501);
+  CHECK(motion.samples() == 101);
+  CHECK(motion.t().back() == 4.0);
+  double fastest = 0.0, hardest = 0.0;
+  for (Eigen::Index i = 0; i < 100; ++i) fastest = std::max(fastest, std::abs(law.x[i + 1] - law.x[i]) * 25.0);
+  for (Eigen::Index i = 1; i < 100; ++i) hardest = std::max(hardest, std::abs(second_difference(law.x, i)) * 625.0);
+  CHECK(motion.max_speed() >= fastest * (1.0 - 1e-12));
+  CHECK(motion.max_acceleration() == doctest::Approx(hardest));
+  CHECK(motion.sample({-1.0, 4.0 / 100.0, 9.0}) ==
+        std::vector<double>{motion.x.front(), motion.sample({0.04})[0], motion.x.back()});
+  for (std::size_t i = 0; i < motion.x.size(); ++i) {
+    const bool free = motion.lower[i] > motion.upper[i];
+    CHECK(motion.sides[i] == (free ? 0 : motion.x[i] >= motion.upper[i] ? 1 : -1));
+  }
+
+  // Straight through the cylinder.
+  std::vector<double> straight(101, 0.1);
+  const CartMotion through = evaluate_cart_motion(path, straight, 0.2, 0.0, 2.0);
+  CHECK(!through.admissible);
+  CHECK(through.energy == 0.0);
+  CHECK(through.clearance == doctest::Approx(0.1));
+  CHECK(through.inside == 35);  // |y| < √(0.2² − 0.1²) = 0.1732, every 0.01
+  CHECK(through.time_inside() == doctest::Approx(0.7));
+  CHECK(through.method == "given");
+
+  const CartMotion down = cart_motion_by_descent(path, 0.1, 0.15, 0.2, {}, {.max_iterations = 2000});
+  CHECK(down.method == "gradient");
+  VectorXd low, high, descended = VectorXd::LinSpaced(101, 0.1, 0.15);
+  intervals_of(path, 0.2, low, high);
+  CHECK(down.iterations == descent_of(low, high, descended, {.max_iterations = 2000}));
+  CHECK((vector_of(down.x) - descended).cwiseAbs().maxCoeff() < 1e-9);
+  CHECK(down.clearance > 0.1);
+  const std::vector<double> guess = admissible_guess(path, 0.1, 0.15, 0.2, {.lower = -1.0, .upper = 1.0});
+  CHECK(guess.front() == 0.1);
+  CHECK(guess.back() == 0.15);
+  CHECK(guess[50] == motion.sides[50]);  // at the end of the cart's range
+  CHECK(evaluate_cart_motion(path, guess, 0.2).admissible);
+  CHECK_THROWS_AS(evaluate_cart_motion(path, {0.0, 1.0}, 0.2), Error);
+  CHECK_THROWS_AS(evaluate_cart_motion(path, straight, 0.2, -1.0), Error);
+  CHECK_THROWS_AS(motion.sample({std::nan("")}), Error);
+}
+
+TEST_CASE("motions with two axes are measured alike") {
+  const PlanarPath path = line(0.0, 0.5, 0.0, -0.5, 101);
+  const PlaneCartMotion motion = plane_cart_motion(path, {0.05, 0.0}, {0.05, 0.0}, 0.2,
+                                                   {.margin = 0.01, .duration = 2.0});
+  const PlaneCartLaw law = plane_cart_law(path, {0.05, 0.0}, {0.05, 0.0}, 0.2, {.margin = 0.01, .duration = 2.0});
+  CHECK(motion.xy == law.c);
+  CHECK(motion.push == law.push);
+  CHECK(motion.energy == doctest::Approx(law.energy).epsilon(1e-12));
+  CHECK(motion.turn == doctest::Approx(law.turn).epsilon(1e-12));
+  CHECK(motion.admissible);
+  CHECK(motion.clearance > 0.2);
+  CHECK(motion.farthest < 0.52);
+  CHECK(motion.sample({0.02}) == std::vector<double>{motion.xy[2], motion.xy[3]});
+  CHECK(motion.max_speed()[1] > 0.0);
+  CHECK(motion.max_acceleration()[0] > 0.0);
+  const PlaneCartMotion stays = evaluate_plane_cart_motion(path, std::vector<double>(202, 0.0), 0.2);
+  CHECK(!stays.admissible);
+  CHECK(stays.clearance == doctest::Approx(0.0));
+  CHECK(stays.farthest == doctest::Approx(0.5));
+  CHECK(stays.max_speed() == AxisPair{0.0, 0.0});
+  CHECK_THROWS_AS(evaluate_plane_cart_motion(path, std::vector<double>(4, 0.0), 0.2), Error);
 }

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import sigmaik as sk
-from sigmaik.planning.time_optimal import time_optimal
+from sigmaik.planning import time_optimal
 
 WEIGHT = 600.0
 

@@ -36,16 +36,28 @@
 ///
 ///     servo_loop.hpp                ServoLoop: a servo in a thread of its own; stale commands stop the arm
 ///     kdl.hpp                       from_kdl, to_kdl: from and to KDL::Chain; the one header that includes KDL
+///     planning/distance_field.hpp   DistanceField: signed distances to obstacles on a grid
+///     planning/arm_spheres.hpp      ArmSpheres: an arm as spheres, from a URDF's shapes or along its links
 ///     planning/batch_cost.hpp       BatchCost: a cost of all support states at once, such as a user's own
 ///     planning/joint_cost.hpp       JointCost: a smooth cost of joint positions, for both planners
 ///     planning/costs.hpp            potentials, manipulability, geometry-aware index as costs; sums of costs
+///     planning/collision_costs.hpp  costs of obstacles, the arm itself and joint limits; min_distance
+///     planning/cost.hpp             Cost: a weighted sum of costs, before it is known of which arm
+///     planning/costs/known_sets.hpp the singular sets that these two take
+///     planning/costs/potential.hpp  Potential: a term of Cost, high near singular sets
+///     planning/costs/manipulability.hpp Manipulability, LogManipulability: terms
+///     planning/costs/geometry_aware.hpp GeometryAware: a term, the geometry-aware index
+///     planning/costs/collision.hpp  Collision, SelfCollision, JointLimits: terms
+///     planning/clearance.hpp        Clearance: how near a motion comes to singular sets
+///     planning/trajectory.hpp       Trajectory: a planned motion; sample, retime, save
+///     planning/collision_check.hpp  CollisionCheck: obstacles that a motion must not touch
 ///     planning/time_optimal.hpp     TimeOptimal: motions within limits, away from what a cost marks
 ///     planning/support_states.hpp   SupportPlanner: smooth motions along which a cost is low, by gradient or samples
+///     planning/plan.hpp             time_optimal, gradient, stochastic: each planner in one call
+///     planning/play.hpp             play: a trajectory through a servo
 ///     planning/cart.hpp             cart_law: where to drive the cart of a cart-mounted arm, clear of a cylinder
 ///     planning/cart_plane.hpp       plane_cart_law: the same with two linear axes
-///     planning/distance_field.hpp   DistanceField: signed distances to obstacles on a grid
-///     planning/arm_spheres.hpp      ArmSpheres: an arm as spheres, from a URDF's shapes or along its links
-///     planning/collision_costs.hpp  costs of obstacles, the arm itself and joint limits; min_distance
+///     planning/cart_motion.hpp      CartMotion, PlaneCartMotion: motions of a cart with their measures
 ///
 /// Set-up throws Error. Calls marked "real time" are noexcept, bounded, and touch neither heap nor lock.
 

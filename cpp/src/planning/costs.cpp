@@ -194,6 +194,32 @@ class LogManipulabilityCost final : public IndexCost {
   }
 };
 
+class ScaledCost final : public JointCost {
+ public:
+  ScaledCost(double factor, JointCostPtr cost) : factor_(factor), cost_(std::move(cost)) {
+    require(std::isfinite(factor) && factor >= 0.0, "a cost times ", factor,
+            ": the factor must be finite and not below 0");
+    require(cost_ != nullptr, "there is no cost to scale");
+  }
+  int dof() const noexcept override { return cost_->dof(); }
+  double value(const JointRef& q) const noexcept override { return factor_ * cost_->value(q); }
+  double gradient(const JointRef& q, JointVector& slope) const noexcept override {
+    const double value = cost_->gradient(q, slope);
+    slope *= factor_;
+    return factor_ * value;
+  }
+  double model(const JointRef& q, JointVector& gradient, JointMatrix& hessian) const noexcept override {
+    const double value = cost_->model(q, gradient, hessian);
+    gradient *= factor_;
+    hessian *= factor_;
+    return factor_ * value;
+  }
+
+ private:
+  double factor_;
+  JointCostPtr cost_;
+};
+
 class SumCost final : public JointCost {
  public:
   explicit SumCost(std::vector<JointCostPtr> costs) : costs_(std::move(costs)) {
@@ -254,6 +280,10 @@ JointCostPtr geometry_aware_cost(const Chain& chain, double k, double weight, do
 
 JointCostPtr log_manipulability_cost(const Chain& chain, double weight) {
   return std::make_shared<LogManipulabilityCost>(chain, weight);
+}
+
+JointCostPtr scaled_cost(double factor, JointCostPtr cost) {
+  return std::make_shared<ScaledCost>(factor, std::move(cost));
 }
 
 JointCostPtr sum_of_costs(std::vector<JointCostPtr> costs) {

@@ -1,8 +1,8 @@
 #include <sigmaik/planning/support_states.hpp>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
-#include <deque>
 #include <limits>
 #include <numeric>
 #include <random>
@@ -11,6 +11,9 @@
 #include <Eigen/Cholesky>
 
 #include "../message.hpp"
+#include "lbfgs.hpp"
+#include "natural_spline.hpp"
+#include "samples.hpp"
 
 namespace sigmaik::planning {
 namespace {
@@ -60,11 +63,27 @@ class Normal {
   double second_ = 0.0;
 };
 
+void check(const std::optional<double>& duration) {
+  require(!duration || (std::isfinite(*duration) && *duration > 0.0), "duration = ", duration.value_or(0.0),
+          " must be finite and greater than 0");
+}
+
+// [s] since it was made.
+class Stopwatch {
+ public:
+  double operator()() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count(); }
+
+ private:
+  std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
+};
+
 }  // namespace
 
 struct SupportPlanner::Work {
   Chain chain;
   BatchCostPtr cost;
+  std::optional<CollisionCheck> obstacles;
+  std::optional<SingularSets> sets;
   int states, n, m;
   Matrix factor;     // C, lower
   Matrix smoothing;  // K̄ with each column's largest entry 1/N (16)
@@ -75,11 +94,19 @@ struct SupportPlanner::Work {
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> rows, gradients;
   Eigen::VectorXd values;
 
-  Work(Chain c, BatchCostPtr l, int count)
-      : chain(std::move(c)), cost(std::move(l)), states(count), n(chain.dof()), m(count - 2) {
+  Work(Chain c, BatchCostPtr l, int count, std::optional<CollisionCheck> o)
+      : chain(std::move(c)),
+        cost(std::move(l)),
+        obstacles(std::move(o)),
+        sets(SingularSets::of(chain)),
+        states(count),
+        n(chain.dof()),
+        m(count - 2) {
     require(states >= 3 && states <= 1000, "states = ", states, " must be in [3, 1000]");
     require(cost != nullptr, "there is no cost");
     require(cost->dof() == n, "the cost is for ", cost->dof(), " joints, the chain has ", n);
+    require(!obstacles || obstacles->spheres().chain().dof() == n, "the spheres are of an arm of ",
+            obstacles ? obstacles->spheres().chain().dof() : 0, " joints, the chain has ", n);
     const Matrix k = covariance(states);
     factor = k.llt().matrixL();
     smoothing = k * (k.colwise().maxCoeff() * (states - 1.0)).cwiseInverse().asDiagonal();
@@ -91,7 +118,7 @@ struct SupportPlanner::Work {
     values.resize(m);
   }
 
-  void begin(const JointVector& start, const JointVector& goal) {
+  void check_ends(const JointVector& start, const JointVector& goal) const {
     for (const auto& [name, q] : {std::pair<const char*, const JointVector*>{"start", &start}, {"goal", &goal}}) {
       require(q->size() == n, name, " has ", q->size(), " entries, the chain has ", n, " joints");
       for (int i = 0; i < n; ++i) {
@@ -100,6 +127,10 @@ struct SupportPlanner::Work {
                 upper[i], "] rad or m");
       }
     }
+  }
+
+  void begin(const JointVector& start, const JointVector& goal) {
+    check_ends(start, goal);
     line.resize(m, n);
     for (int i = 0; i < m; ++i) {
       line.row(i) = (start + (i + 1.0) / (states - 1.0) * (goal - start)).transpose();
@@ -133,6 +164,34 @@ struct SupportPlanner::Work {
     return std::accumulate(values.begin(), values.end(), 0.0);
   }
 
+  // What plan() returns: the spline through the states, or a failed plan where it touches an obstacle.
+  Trajectory motion(const SupportStates& found, double prior_weight, PlanStatus status, std::optional<double> duration,
+                    double solve_time) const {
+    const detail::NaturalSpline spline = detail::NaturalSpline::within(chain.limits(), found.q, states, n);
+    Trajectory plan = spline.over(duration ? *duration : spline.shortest(chain.limits()));
+    plan.status = status;
+    plan.cost = found.cost + prior_weight * found.distance;
+    if (obstacles && !obstacles->free(plan)) {
+      plan = Trajectory();
+      plan.dof = n;
+      plan.cubic = true;
+    } else {
+      std::vector<double> dense = detail::evenly(0.0, plan.duration, detail::kDense * (plan.size() - 1) + 1);
+      const JointSamples samples = plan.sample(dense);
+      plan.clearance = clearance(chain, sets, std::move(dense), samples.q);
+    }
+    plan.solve_time = solve_time;
+    plan.iterations = found.iterations;
+    return plan;
+  }
+
+  void require_free(const JointVector& start, const JointVector& goal) const {
+    if (!obstacles) return;
+    check_ends(start, goal);
+    obstacles->require_free("start", start);
+    obstacles->require_free("goal", goal);
+  }
+
   Matrix whiten(const Matrix& q) const { return factor.triangularView<Eigen::Lower>().solve(q - line); }
 
   SupportStates result(const JointVector& start, const JointVector& goal, const Matrix& q, double value, int iterations,
@@ -151,8 +210,8 @@ struct SupportPlanner::Work {
   }
 };
 
-SupportPlanner::SupportPlanner(Chain chain, BatchCostPtr cost, int states)
-    : work_(std::make_unique<Work>(std::move(chain), std::move(cost), states)) {}
+SupportPlanner::SupportPlanner(Chain chain, BatchCostPtr cost, int states, std::optional<CollisionCheck> obstacles)
+    : work_(std::make_unique<Work>(std::move(chain), std::move(cost), states, std::move(obstacles))) {}
 SupportPlanner::~SupportPlanner() = default;
 SupportPlanner::SupportPlanner(SupportPlanner&&) noexcept = default;
 SupportPlanner& SupportPlanner::operator=(SupportPlanner&&) noexcept = default;
@@ -177,86 +236,30 @@ SupportStates SupportPlanner::gradient(const JointVector& start, const JointVect
     w.clip(q);
     x = w.whiten(q);
   }
-  // States beyond a limit cost what those on it do, and as much as it takes to bring them back.
-  double states_cost = 0.0;
-  const auto evaluate = [&](const Matrix& at, Matrix& states, Matrix& slope) {
-    states.noalias() = w.factor.triangularView<Eigen::Lower>() * at;
-    states += w.line;
-    Matrix inside = states;
+  // States beyond a limit cost as much as those on it, and a penalty that brings them back.
+  double states_cost = 0.0, cost = 0.0;
+  Matrix q_new(w.m, w.n);
+  const auto evaluate = [&](const Matrix& at, Matrix& slope) {
+    q_new.noalias() = w.factor.triangularView<Eigen::Lower>() * at;
+    q_new += w.line;
+    Matrix inside = q_new;
     w.clip(inside);
     states_cost = w.slopes(inside, dq);
-    const Matrix beyond = states - inside;
+    const Matrix beyond = q_new - inside;
     dq = (beyond.array() != 0.0).select(2e4 * beyond, dq);
     slope.noalias() = w.factor.transpose().triangularView<Eigen::Upper>() * dq;
     slope += 2.0 * options.prior_weight * at;
     return states_cost + 1e4 * beyond.squaredNorm() + options.prior_weight * at.squaredNorm();
   };
-
-  struct Pair {
-    Matrix s, y;
-    double rho;
-  };
-  std::deque<Pair> memory;
-  Matrix slope(w.m, w.n), direction, x_new, slope_new(w.m, w.n), q_new(w.m, w.n);
-  double f = evaluate(x, q, slope), cost = states_cost;
-  bool converged = false;
-  int iteration = 0;
-  for (; iteration < options.max_iterations && !converged; ++iteration) {
-    direction = slope;
-    std::vector<double> alpha(memory.size());
-    for (std::size_t i = memory.size(); i-- > 0;) {
-      alpha[i] = memory[i].rho * memory[i].s.cwiseProduct(direction).sum();
-      direction -= alpha[i] * memory[i].y;
-    }
-    // The first step moves half-way states by a tenth of a radian at most.
-    direction *= memory.empty() ? 0.1 / std::max(direction.norm(), 1e-300)
-                                : 1.0 / (memory.back().rho * memory.back().y.squaredNorm());
-    for (std::size_t i = 0; i < memory.size(); ++i) {
-      direction += (alpha[i] - memory[i].rho * memory[i].y.cwiseProduct(direction).sum()) * memory[i].s;
-    }
-    const double along = -slope.cwiseProduct(direction).sum();
-    if (!(along < 0.0)) {
-      if (memory.empty()) {
-        converged = true;
-        break;
-      }
-      memory.clear();
-      continue;
-    }
-    double step = 1.0, f_new = 0.0;
-    bool found = false;
-    for (int trial = 0; trial < 30; ++trial, step *= 0.5) {
-      x_new = x - step * direction;
-      f_new = evaluate(x_new, q_new, slope_new);
-      if (f_new <= f + 1e-4 * step * along) {
-        found = true;
-        break;
-      }
-    }
-    if (!found) {
-      if (memory.empty()) {
-        converged = true;
-        break;
-      }
-      memory.clear();
-      continue;
-    }
-    Pair pair{x_new - x, slope_new - slope, 0.0};
-    const double curvature = pair.s.cwiseProduct(pair.y).sum();
-    if (curvature > 1e-12 * pair.s.norm() * pair.y.norm()) {
-      pair.rho = 1.0 / curvature;
-      memory.push_back(std::move(pair));
-      if (memory.size() > 8) memory.pop_front();
-    }
-    converged = f - f_new <= options.tolerance * std::abs(f_new);
-    x.swap(x_new);
+  const auto accept = [&] {
     q.swap(q_new);
-    slope.swap(slope_new);
-    f = f_new;
     cost = states_cost;
-  }
+  };
+  // The first step moves the states half-way by at most a tenth of a radian.
+  detail::Lbfgs search({options.max_iterations, options.tolerance, 0.1});
+  search.minimise(x, evaluate, accept);
   w.clip(q);
-  return w.result(start, goal, q, cost, iteration, converged);
+  return w.result(start, goal, q, cost, search.iterations(), search.converged());
 }
 
 SupportStates SupportPlanner::stochastic(const JointVector& start, const JointVector& goal,
@@ -338,30 +341,41 @@ SupportStates SupportPlanner::draw(const JointVector& start, const JointVector& 
   return w.result(start, goal, q, w.value(q), 0, false);
 }
 
-// Tridiagonal: v_{i−1} + 4 v_i + v_{i+1} = 3 (q_{i+1} − q_{i−1})/h, and 2 v_0 + v_1 = 3 (q_1 − q_0)/h at the ends.
-std::vector<double> spline_velocities(const std::vector<double>& q, int states, int dof) {
-  require(states >= 2 && dof >= 1 && q.size() == static_cast<std::size_t>(states * dof), "the motion has ", q.size(),
-          " numbers, needs ", states, " × ", dof);
-  const double h = 1.0 / (states - 1.0);
-  const auto at = [&](int i, int j) { return q[static_cast<std::size_t>(i * dof + j)]; };
-  std::vector<double> v(q.size()), upper(static_cast<std::size_t>(states));
-  for (int j = 0; j < dof; ++j) {
-    for (int i = 0; i < states; ++i) {
-      const bool first = i == 0, last = i == states - 1;
-      const double diagonal = first || last ? 2.0 : 4.0;
-      const double right = 3.0 / h * (at(last ? i : i + 1, j) - at(first ? i : i - 1, j));
-      const double before = first ? 0.0 : upper[static_cast<std::size_t>(i - 1)];
-      const double pivot = diagonal - before;
-      upper[static_cast<std::size_t>(i)] = 1.0 / pivot;
-      const double carried = first ? 0.0 : v[static_cast<std::size_t>((i - 1) * dof + j)];
-      v[static_cast<std::size_t>(i * dof + j)] = (right - carried) / pivot;
-    }
-    for (int i = states - 2; i >= 0; --i) {
-      v[static_cast<std::size_t>(i * dof + j)] -= upper[static_cast<std::size_t>(i)] *
-                                                  v[static_cast<std::size_t>((i + 1) * dof + j)];
-    }
+Trajectory SupportPlanner::plan(const JointVector& start, const JointVector& goal, const GradientOptions& options) {
+  constexpr double kDeviation = 0.5;  // [rad or m] of first guesses, half-way
+  require(options.restarts >= 0, "restarts = ", options.restarts, " must be at least 0");
+  check(options.duration);
+  work_->require_free(start, goal);
+  const Stopwatch time;
+  const auto from = [&](const std::vector<double>& guess) {
+    const SupportStates found = gradient(start, goal, options, guess);
+    return work_->motion(found, options.prior_weight, found.converged ? PlanStatus::Optimal : PlanStatus::Feasible,
+                         options.duration, time());
+  };
+  Trajectory best = from({});
+  if (best.status != PlanStatus::Failed || options.restarts == 0) return best;
+  for (int seed = 0; seed < options.restarts; ++seed) {
+    Trajectory other = from(draw(start, goal, kDeviation, static_cast<std::uint64_t>(seed)).q);
+    if (other.status != PlanStatus::Failed && !(best.cost <= other.cost)) best = std::move(other);
   }
-  return v;
+  best.solve_time = time();
+  return best;
+}
+
+Trajectory SupportPlanner::plan(const JointVector& start, const JointVector& goal, const StochasticOptions& options) {
+  check(options.duration);
+  work_->require_free(start, goal);
+  const Stopwatch time;
+  const SupportStates found = stochastic(start, goal, options);
+  Trajectory rough = work_->motion(found, options.prior_weight, PlanStatus::Feasible, options.duration, time());
+  if (!options.refine) return rough;
+  GradientOptions finish;
+  finish.prior_weight = std::max(options.prior_weight, 1e-6);
+  const SupportStates fine = gradient(start, goal, finish, found.q);
+  Trajectory refined = work_->motion(fine, options.prior_weight,
+                                     fine.converged ? PlanStatus::Optimal : PlanStatus::Feasible, options.duration,
+                                     time());
+  return refined.status == PlanStatus::Failed ? rough : refined;
 }
 
 }  // namespace sigmaik::planning

@@ -1,13 +1,17 @@
 #include <sigmaik/planning/time_optimal.hpp>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <utility>
 
 #include "../aligned.hpp"
 #include "../message.hpp"
 #include "interior_point.hpp"
+#include "other_side.hpp"
+#include "samples.hpp"
 
 namespace sigmaik::planning {
 namespace detail {
@@ -55,11 +59,11 @@ const Kernels<W>& kernels() noexcept {
 
 namespace {
 
+using detail::kDense;
 using sigmaik::detail::require;
 
-constexpr double kWorthALook = 1e-3;    // a node's cost, as a part of what time costs, that warrants other starts
+constexpr double kWorthALook = 1e-3;    // a node's cost, as a part of the time's cost, that warrants other starts
 constexpr double kStandingStep = 1e-6;  // [s] of a motion that goes nowhere
-constexpr double kBend = 0.6;           // [rad or m] by which these are bent
 
 std::unique_ptr<TimeOptimal::Engine> make_engine(const Chain& chain, const JointCostPtr& cost,
                                                  const TimeOptimalOptions& options) {
@@ -69,16 +73,16 @@ std::unique_ptr<TimeOptimal::Engine> make_engine(const Chain& chain, const Joint
 
 }  // namespace
 
-const char* to_string(PlanStatus status) noexcept {
-  switch (status) {
-    case PlanStatus::Optimal: return "optimal";
-    case PlanStatus::Feasible: return "feasible";
-    default: return "failed";
-  }
-}
-
 TimeOptimal::TimeOptimal(Chain chain, JointCostPtr cost, const TimeOptimalOptions& options)
-    : chain_(std::move(chain)), cost_(std::move(cost)), options_(options) {
+    : TimeOptimal(chain, std::move(cost), options, SingularSets::of(chain)) {}
+
+TimeOptimal::TimeOptimal(Chain chain, JointCostPtr cost, const TimeOptimalOptions& options,
+                         std::optional<SingularSets> sets, std::optional<CollisionCheck> obstacles)
+    : chain_(std::move(chain)),
+      cost_(std::move(cost)),
+      options_(options),
+      sets_(std::move(sets)),
+      obstacles_(std::move(obstacles)) {
   const auto number = [](const char* name, double value, double least, bool open) {
     require(std::isfinite(value) && (open ? value > least : value >= least), name, " = ", value, " must be finite and ",
             open ? "greater than " : "at least ", least);
@@ -96,6 +100,10 @@ TimeOptimal::TimeOptimal(Chain chain, JointCostPtr cost, const TimeOptimalOption
             chain_.joint_names()[static_cast<std::size_t>(i)],
             "' has no acceleration limit: without effort to pay nothing bounds it");
   }
+  require(!sets_ || sets_->dof() == chain_.dof(), "the singular sets are for ", sets_ ? sets_->dof() : 0,
+          " joints, the chain has ", chain_.dof());
+  require(!obstacles_ || obstacles_->spheres().chain().dof() == chain_.dof(), "the spheres are of an arm of ",
+          obstacles_ ? obstacles_->spheres().chain().dof() : 0, " joints, the chain has ", chain_.dof());
   engine_ = make_engine(chain_, cost_, options_);
 }
 TimeOptimal::~TimeOptimal() = default;
@@ -132,8 +140,9 @@ void TimeOptimal::check(const TimeOptimalProblem& problem) const {
   within("goal_velocity", problem.goal_velocity, "rad/s or m/s", slowest, fastest);
 }
 
-// The direction, of length 1, in which the cost falls fastest where the motion found pays most; empty where it pays
-// nothing worth a second look. On top of a hill nothing falls: there it is the way in which the hill bends down most.
+// The direction, of length 1, in which the cost falls fastest at the motion's most expensive node; empty where this
+// node's cost is small. At a maximum of the cost the gradient is zero: there the direction is that of the Hessian's
+// smallest eigenvalue.
 JointVector TimeOptimal::way_out(const TimeOptimalResult& found) const {
   const int n = chain_.dof();
   const auto node = [&](int k) { return Eigen::Map<const Eigen::VectorXd>(found.q.data() + k * n, n); };
@@ -155,7 +164,8 @@ JointVector TimeOptimal::way_out(const TimeOptimalResult& found) const {
   return Eigen::SelfAdjointEigenSolver<sigmaik::detail::Aligned<JointMatrix>>(hessian).eigenvectors().col(0);
 }
 
-// To stay where one is, which has no interior where that is on a limit.
+// A standing motion, for start == goal. The interior-point method has no strictly feasible point where the start lies
+// on a limit.
 TimeOptimalResult TimeOptimal::stand(const TimeOptimalProblem& problem) const {
   const auto n = static_cast<std::size_t>(chain_.dof()), nodes = static_cast<std::size_t>(options_.nodes);
   TimeOptimalResult out;
@@ -182,25 +192,88 @@ TimeOptimalResult TimeOptimal::solve(const TimeOptimalProblem& problem) {
   const JointVector out = way_out(best);
   if (out.size() == 0) return best;
   int iterations = best.iterations;
-  const JointLimits& limits = chain_.limits();
   const auto before = [](const TimeOptimalResult& a, const TimeOptimalResult& b) {
     return a.status != b.status ? a.status < b.status : a.cost < b.cost;
   };
-  for (const double bend : {kBend, -kBend}) {
-    TimeOptimalProblem bent = problem;
-    bent.bend = bend * out;
-    if (problem.bend.size() != 0) bent.bend += problem.bend;
-    for (int i = 0; i < chain_.dof(); ++i) {  // so that the guess stays within its limits
-      const double low = limits.lower[i] - std::min(problem.start[i], problem.goal[i]);
-      const double high = limits.upper[i] - std::max(problem.start[i], problem.goal[i]);
-      bent.bend[i] = std::clamp(bent.bend[i], 0.4 * low, 0.4 * high);
-    }
-    TimeOptimalResult other = engine_->solve(bent);
+  for (const double side : {1.0, -1.0}) {
+    TimeOptimalResult other = engine_->solve(detail::bent(chain_, problem, side * out));
     iterations += other.iterations;
     other.starts = ++best.starts;
     if (before(other, best)) best = std::move(other);
   }
   best.iterations = iterations;
+  return best;
+}
+
+Trajectory TimeOptimal::timed_plan(const TimeOptimalProblem& problem) {
+  const auto begin = std::chrono::steady_clock::now();
+  TimeOptimalResult found = solve(problem);
+  Trajectory plan;
+  plan.solve_time = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  plan.dof = chain_.dof();
+  plan.status = found.status;
+  plan.iterations = found.iterations;
+  plan.starts = found.starts;
+  if (found.status == PlanStatus::Failed) return plan;
+  const auto nodes = static_cast<std::size_t>(options_.nodes);
+  plan.duration = found.duration;
+  plan.cost = found.cost;
+  for (std::size_t k = 0; k < nodes; ++k) {
+    plan.t.push_back(static_cast<double>(k) * (found.duration / static_cast<double>(nodes)));
+  }
+  plan.q = std::move(found.q);
+  plan.qdot = std::move(found.qdot);
+  plan.qddot = std::move(found.qddot);
+  std::vector<double> dense = detail::evenly(0.0, plan.t.back(), kDense * (nodes - 1) + 1);
+  const JointSamples samples = plan.sample(dense);
+  plan.clearance = clearance(chain_, sets_, std::move(dense), samples.q, options_.clearance_width);
+  return plan;
+}
+
+double TimeOptimal::along(const Trajectory& plan) const {
+  if (!plan.clearance) return std::numeric_limits<double>::infinity();
+  double marked = 0.0, effort = 0.0;
+  if (cost_) {
+    const std::size_t count = plan.clearance->t.size();
+    std::vector<double> values(count);
+    cost_->evaluate(count, plan.sample(plan.clearance->t).q.data(), values.data(), nullptr);
+    marked = std::accumulate(values.begin(), values.end(), 0.0);
+  }
+  for (const double a : plan.qddot) effort += a * a;
+  return options_.time_weight * plan.duration + options_.effort_weight * effort + marked / static_cast<double>(kDense);
+}
+
+Trajectory TimeOptimal::plan(const TimeOptimalProblem& problem) {
+  if (!obstacles_) return best_plan(problem);
+  check(problem);
+  obstacles_->require_free("start", problem.start);
+  obstacles_->require_free("goal", problem.goal);
+  Trajectory best = best_plan(problem);
+  if (best.status == PlanStatus::Failed || obstacles_->free(best)) return best;
+  Trajectory failed;
+  failed.dof = best.dof;
+  failed.solve_time = best.solve_time;
+  failed.iterations = best.iterations;
+  failed.starts = best.starts;
+  return failed;
+}
+
+Trajectory TimeOptimal::best_plan(const TimeOptimalProblem& problem) {
+  Trajectory best = timed_plan(problem);
+  if (!options_.restarts || !cost_ || !sets_ || !best.clearance) return best;
+  const std::vector<Crossing>& crossings = best.clearance->crossings;
+  const auto avoidable = std::find_if(crossings.begin(), crossings.end(),
+                                      [](const Crossing& c) { return c.avoidable; });
+  if (avoidable == crossings.end()) return best;
+  TimeOptimalProblem other_way = problem;
+  other_way.bend = JointVector();
+  Trajectory other = timed_plan(detail::bent(chain_, other_way, detail::other_side(*sets_, *avoidable, problem.start)));
+  const double solve_time = best.solve_time + other.solve_time;
+  const int iterations = best.iterations + other.iterations, starts = best.starts + other.starts;
+  if (along(other) < along(best)) best = std::move(other);
+  best.solve_time = solve_time;
+  best.iterations = iterations;
+  best.starts = starts;
   return best;
 }
 

@@ -4,7 +4,10 @@ Every planner returns a trajectory, which can be drawn and played:
 
     trajectory = sk.planning.time_optimal(chain, start, goal, avoid="potential", time_weight=600.0)
     trajectory.t, trajectory.q, trajectory.qdot, trajectory.qddot
-    trajectory = sk.planning.gradient(chain, start, goal)         # or stochastic: along a good geometry-aware index
+    cost = sk.planning.costs.Potential() + 2.0 * sk.planning.costs.Collision(obstacles)  # or any object with value(q)
+    options = sk.planning.TimeOptimalOptions(nodes=40)
+    trajectory = sk.planning.time_optimal(chain, start, goal, cost=cost, options=options)
+    trajectory = sk.planning.gradient(chain, start, goal)  # or stochastic: along a good geometry-aware index
     trajectory.clearance.min_manipulability, trajectory.clearance.crossings
     trajectory.plot("motion.png", chain)
     done = sk.planning.play(trajectory, servo)                         # a servo that stands at its start
@@ -19,27 +22,38 @@ Every planner returns a trajectory, which can be drawn and played:
 
 from sigmaik._core import (
     ArmSpheres,
+    Clearance,
+    Crossing,
     DistanceField,
     JointCost,
+    Playback,
+    Trajectory,
     joint_limit_cost,
+    play,
     self_collision_cost,
     self_collision_pairs,
     sum_of_costs,
 )
 
+from . import costs
+from ._cart_trajectory import CartTrajectory, ShoulderCylinder, cart_trajectory, shoulder_cylinder
+from ._time_optimal import time_optimal
 from .batch_cost import BatchCost
 from .cart import CartError, CartMotion, CartRegion, cart_motion, evaluate_cart_motion
 from .cart_plane import PlaneCartMotion, cart_motion_plane, evaluate_cart_motion_plane
-from .cart_trajectory import CartTrajectory, ShoulderCylinder, cart_trajectory, shoulder_cylinder
-from .clearance import Clearance, Crossing
 from .collision import arm_spheres, collision_cost, min_distance
+from .costs import Cost
 from .obstacles import Box, Cylinder, Obstacles, Sphere
-from .playing import Playback, play
-from .support import gradient, stochastic
-from .time_optimal import time_optimal
-from .trajectory import Trajectory
+from .options import GradientOptions, StochasticOptions, TimeOptimalOptions
+from .smooth import gradient, stochastic
+from .status import PlanStatus
 
 __all__ = [
+    "Cost",
+    "GradientOptions",
+    "StochasticOptions",
+    "TimeOptimalOptions",
+    "costs",
     "ArmSpheres",
     "BatchCost",
     "Box",
@@ -53,6 +67,7 @@ __all__ = [
     "DistanceField",
     "JointCost",
     "Obstacles",
+    "PlanStatus",
     "PlaneCartMotion",
     "Playback",
     "ShoulderCylinder",

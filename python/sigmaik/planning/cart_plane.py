@@ -3,101 +3,51 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, TypedDict
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from sigmaik import _core
-from sigmaik._types import Array
+from sigmaik._core import PlaneCartMotion, evaluate_cart_motion_plane
 
-from .cart import TOLERANCE, azimuth_turn, least_distance, planar_path, positive
+from .options import checked
 
-__all__ = ["PlaneCartMotion", "cart_motion_plane", "evaluate_cart_motion_plane"]
-Range = tuple[float, float]
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+__all__ = ["PlaneCartKeywords", "PlaneCartMotion", "cart_motion_plane", "evaluate_cart_motion_plane"]
 
 EVERYWHERE = (-math.inf, math.inf)
 
 
-@dataclass(frozen=True)
-class PlaneCartMotion:
-    """Where a cart with two axes is at each of M samples evenly spaced in time, straight between them."""
+class PlaneCartKeywords(TypedDict, total=False):
+    """Options of `cart_motion_plane`."""
 
-    xy: Array = field(repr=False)
-    """(M, 2) [m] of the cart."""
-    flange_xy: Array = field(repr=False)
-    """(M, 2) [m] the path that was given."""
-    push: Array | None = field(repr=False)
-    """(M,) [m] ≥ 0, |2c_i − c_{i−1} − c_{i+1}| where the cart c touches the disc about the point, away from it, else 0.
-    At an optimum without limits the cart bends nowhere else. None for a motion that was only looked at."""
-    radius: float
-    """[m] of the forbidden disc, without the margin."""
+    turn: float | None
+    """[rad] that joint 1 turns through. Motions that turn the point's azimuth by another number of whole turns are
+    left out: they would not bring the arm to its taught joints. None: the winding is free. None."""
+    x_range: tuple[float, float]
+    """[m] (lowest, highest) position of the first axis; unlimited. Where both are the same the axis stands."""
+    y_range: tuple[float, float]
+    """[m] of the second axis."""
+    max_radius: float
+    """[m] > radius + margin: the arm's reach, the farthest that the point may be from axis 1; unlimited."""
     margin: float
-    """[m] that was added to the radius in planning."""
+    """[m] ≥ 0, added to the radius in planning; 0. Between samples the point can be nearer than radius + margin by
+    (r/8) of the square of the angle that a step turns it by; `clearance` tells."""
     duration: float
-    """[s] from the first to the last sample."""
-    energy: float
-    """[m²] Σ |c_{i+1} − c_i|²."""
-    admissible: bool
-    """No sample is within the radius."""
-    clearance: float
-    """[m] the point's least distance from the first joint's axis, between the samples too."""
-    farthest: float
-    """[m] the point's largest distance from it."""
-    inside: int
-    """Samples within the radius."""
-    turn: float
-    """[rad] by which the point's azimuth turns, seen from the axis: which way round, and how often."""
-    starts: int = 0
-    """First guesses tried."""
-    programs: int = 0
-    """Quadratic programs solved."""
-
-    @property
-    def time_inside(self) -> float:
-        """[s] of the samples within the radius."""
-        return self.inside * self.duration / (len(self.xy) - 1)
-
-    @property
-    def t(self) -> Array:
-        """(M,) [s] of the samples."""
-        return np.linspace(0.0, self.duration, len(self.xy))
-
-    @property
-    def max_speed(self) -> Array:
-        """(2,) [m/s] of each axis."""
-        top: Array = np.max(np.abs(np.diff(self.xy, axis=0)), axis=0) * ((len(self.xy) - 1) / self.duration)
-        return top
-
-    @property
-    def max_acceleration(self) -> Array:
-        """(2,) [m/s²] of each axis, the largest second differences over the samples."""
-        top: Array = np.max(np.abs(np.diff(self.xy, 2, axis=0)), axis=0) * ((len(self.xy) - 1) / self.duration) ** 2
-        return top
-
-    def sample(self, t: ArrayLike) -> Array:
-        """xy (…, 2) [m] at times t (…) [s], held at the ends."""
-        times = np.asarray(t, dtype=np.float64)
-        if not np.all(np.isfinite(times)):
-            raise ValueError("t must be finite")
-        return np.stack([np.interp(times, self.t, self.xy[:, axis]) for axis in (0, 1)], axis=-1)
+    """[s] > 0 from the first to the last sample; 1. The limits count in it."""
+    max_speed: float | ArrayLike
+    """[m/s] of each axis, one number for both or (2,); unlimited."""
+    max_acceleration: float | ArrayLike
+    """[m/s²] of each axis, second differences over the samples; unlimited. Where the best motion does not keep to
+    the limits, the one of the least energy that does takes its place, along the same way."""
+    at_rest: bool
+    """Start and stop within max_acceleration, where that is finite; False."""
 
 
 def cart_motion_plane(
-    flange_xy: ArrayLike,
-    start: ArrayLike,
-    end: ArrayLike,
-    radius: float,
-    *,
-    turn: float | None = None,
-    x_range: Range = EVERYWHERE,
-    y_range: Range = EVERYWHERE,
-    max_radius: float = math.inf,
-    margin: float = 0.0,
-    duration: float = 1.0,
-    max_speed: float | ArrayLike = math.inf,
-    max_acceleration: float | ArrayLike = math.inf,
-    at_rest: bool = False,
+    flange_xy: ArrayLike, start: ArrayLike, end: ArrayLike, radius: float, **options: Unpack[PlaneCartKeywords]
 ) -> PlaneCartMotion:
     """A motion of a cart with two linear axes that keeps a point of the arm out of a cylinder about the first joint's
     axis.
@@ -120,24 +70,8 @@ def cart_motion_plane(
         (2,) [m] of the cart, where axis 1 stands, at the first and last sample.
     radius
         [m] of the cylinder.
-    turn
-        [rad] that joint 1 turns through. Motions that turn the point's azimuth by another number of whole turns are
-        left out: they would not bring the arm to its taught joints. None: the winding is free.
-    x_range, y_range
-        [m] (lowest, highest) position of each axis. Where both are the same the axis stands.
-    max_radius
-        [m] greater than radius + margin: the arm's reach, the farthest that the point may be from axis 1.
-    margin
-        [m] added to the radius in planning. Between samples the point can be nearer than radius + margin by (r/8) of
-        the square of the angle that a step turns it by; `clearance` tells.
-    duration
-        [s] from the first to the last sample. The limits count in it.
-    max_speed, max_acceleration
-        [m/s], [m/s²] of each axis, one number for both or (2,); accelerations are second differences over the samples.
-        Where the best motion does not keep to them, the one of the least energy that does takes its place, along the
-        same way.
-    at_rest
-        Start and stop within max_acceleration, where that is finite.
+    options
+        `PlaneCartKeywords`: turn, x_range, y_range, max_radius, margin, duration, max_speed, max_acceleration, at_rest.
 
     Raises
     ------
@@ -147,70 +81,7 @@ def cart_motion_plane(
     ValueError
         where an argument is out of its range.
     """
-    law = _core.plane_cart_law(
-        flange_xy,
-        start,
-        end,
-        radius,
-        lower=[x_range[0], y_range[0]],
-        upper=[x_range[1], y_range[1]],
-        margin=margin,
-        max_radius=max_radius,
-        turn=turn,
-        duration=duration,
-        max_speed=_of_both("max_speed", max_speed),
-        max_acceleration=_of_both("max_acceleration", max_acceleration),
-        at_rest=at_rest,
-    )
-    return _motion(flange_xy, law.c, radius, margin, duration, law.push, law.starts, law.programs)
-
-
-def evaluate_cart_motion_plane(
-    flange_xy: ArrayLike, xy: ArrayLike, radius: float, *, margin: float = 0.0, duration: float = 1.0
-) -> PlaneCartMotion:
-    """Any motion xy (M, 2) [m] of the cart, such as the straight one, looked at as `cart_motion_plane` does."""
-    return _motion(flange_xy, xy, radius, margin, duration, None, 0, 0)
-
-
-def _motion(
-    flange_xy: ArrayLike,
-    xy: ArrayLike,
-    radius: float,
-    margin: float,
-    duration: float,
-    push: Array | None,
-    starts: int,
-    programs: int,
-) -> PlaneCartMotion:
-    path, cart = planar_path(flange_xy), np.array(xy, dtype=np.float64)
-    if cart.shape != path.shape or not np.all(np.isfinite(cart)):
-        raise ValueError(f"xy must be finite and of shape ({len(path)}, 2), not {cart.shape}")
-    positive("duration", duration)
-    positive("radius", radius)
-    seen = path - cart
-    distance = np.hypot(seen[:, 0], seen[:, 1])
-    # A program's answer is on the border to about 1e-9 of the radius.
-    inside = int(np.count_nonzero(distance < radius * (1.0 - 1e3 * TOLERANCE)))
-    return PlaneCartMotion(
-        xy=cart,
-        flange_xy=path,
-        push=push,
-        radius=radius,
-        margin=margin,
-        duration=duration,
-        energy=float(np.sum(np.diff(cart, axis=0) ** 2)),
-        admissible=inside == 0,
-        clearance=least_distance(seen),
-        farthest=float(np.max(distance)),
-        inside=inside,
-        turn=azimuth_turn(seen),
-        starts=starts,
-        programs=programs,
-    )
-
-
-def _of_both(name: str, value: float | ArrayLike) -> Array:
-    limits = np.asarray(value, dtype=np.float64)
-    if limits.shape not in ((), (2,)):
-        raise ValueError(f"{name} must be a number, or of shape (2,), not {limits.shape}")
-    return np.broadcast_to(limits, (2,)).copy()
+    given = checked("cart_motion_plane", PlaneCartKeywords, options, None)
+    ranges = given.pop("x_range", EVERYWHERE), given.pop("y_range", EVERYWHERE)
+    lower, upper = ([limits[end_of] for limits in ranges] for end_of in (0, 1))
+    return _core.plane_cart_motion(flange_xy, start, end, radius, lower=lower, upper=upper, **given)

@@ -13,9 +13,7 @@ from sigmaik._plotting import DASHES, JOINT_COLOURS, empty_figure, limit_lines
 from sigmaik._types import Array
 
 if TYPE_CHECKING:
-    from sigmaik._core import Chain
-
-    from .trajectory import Trajectory
+    from sigmaik._core import Chain, Trajectory
 
 __all__ = ["trajectory_figure"]
 

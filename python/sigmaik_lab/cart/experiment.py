@@ -20,10 +20,10 @@ import numpy as np
 import sigmaik as sk
 from sigmaik import _core
 from sigmaik._types import Array
+from sigmaik.planning._cart_trajectory import follow
 from sigmaik.planning.cart import PUBLISHED_ITERATIONS, CartMotion, cart_motion, evaluate_cart_motion
 from sigmaik.planning.cart_path import PosePath, pose_paths
 from sigmaik.planning.cart_plane import PlaneCartMotion, cart_motion_plane
-from sigmaik.planning.cart_trajectory import follow
 
 __all__ = ["METHODS", "ROBOT", "VARIANTS", "CartExperiment", "CartRun", "cart_xy", "density", "descent", "load", "run"]
 

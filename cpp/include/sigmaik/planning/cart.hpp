@@ -31,12 +31,8 @@
 
 namespace sigmaik::planning {
 
-/// Numbers of any count. Eigen takes storage for an unaligned vector from std::malloc, whatever the compiler's flags
-/// are.
-using VectorXd = Eigen::Matrix<double, Eigen::Dynamic, 1, kLayout>;
-/// Argument: one number a sample, (M,).
-using VectorRef = Eigen::Ref<const VectorXd>;
-/// Positions (M, 2) [m].
+/// Positions (M, 2) [m]. Only arguments are of this type: results are std::vectors, whose allocator does not depend on
+/// the compiler's flags as Eigen's does.
 using PlanarPath = Eigen::Matrix<double, Eigen::Dynamic, 2, Eigen::RowMajor | Eigen::DontAlign>;
 
 /// Why there is no cart motion.
@@ -94,28 +90,26 @@ struct CartRegion {
 
 /// A law of the cart, and what it had to keep out of.
 struct CartLaw {
-  VectorXd x;                       ///< (M,) [m] at the samples
-  VectorXd lower;                   ///< (M,) [m] λ− for radius + margin; +∞ where nothing is forbidden
-  VectorXd upper;                   ///< (M,) [m] λ+ for radius + margin; −∞ where nothing is forbidden
-  VectorXd multipliers;             ///< (M,) [m] μ: positive where the law is held up, negative where it is held down
-  std::vector<CartRegion> regions;  ///< parts of the forbidden region, in the order of time
-  /// The string's corners [samples]; the string is straight between them. A corner at the tip of a region can lie
-  /// between samples.
-  std::vector<double> corners;
-  std::vector<double> corner_x;  ///< the cart's positions at the corners [m]
-  double energy = 0.0;           ///< [m²] Σ (Δx)²; where a corner lies between samples Σ (Δx)²/Δi, the string's own
-  double turn = 0.0;             ///< [rad] of P's azimuth
-  int strings = 0;               ///< taut strings drawn
+  std::vector<double> x;             ///< (M,) [m] at the samples
+  std::vector<double> lower, upper;  ///< (M,) [m] λ∓ for radius + margin; +∞ and −∞ where nothing is forbidden
+  std::vector<double> multipliers;   ///< (M,) [m] μ: positive where the law is held up, negative where it is held down
+  std::vector<CartRegion> regions;
+  /// The string's corners: where [samples], and at which position [m]; straight between them. A corner at the tip of a
+  /// region can lie between samples.
+  std::vector<double> corners, corner_x;
+  double energy = 0.0;  ///< [m²] Σ (Δx)²; where a corner lies between samples Σ (Δx)²/Δi, the string's own
+  double turn = 0.0;    ///< [rad] of P's azimuth
+  int strings = 0;      ///< taut strings drawn
 };
 
 /// λ∓ (6) of every sample [m]; +∞ and −∞, the empty interval, where |y| ≥ radius.
-void forbidden_intervals(const PlanarPath& path, double radius, VectorXd& lower, VectorXd& upper);
+void forbidden_intervals(const PlanarPath& path, double radius, std::vector<double>& lower, std::vector<double>& upper);
 
 /// The shortest string through lower ≤ x ≤ upper over increasing abscissae `at`; the ends are where both are equal.
 /// Writes x, and the indices of its corners, both ends among them. One pass of a funnel, O(M).
 /// \throws Error where sizes differ, an abscissa does not increase, lower > upper somewhere, or an end is not given
-void taut_string(const VectorRef& at, const VectorRef& lower, const VectorRef& upper, VectorXd& x,
-                 std::vector<int>& corners);
+void taut_string(const std::vector<double>& at, const std::vector<double>& lower, const std::vector<double>& upper,
+                 std::vector<double>& x, std::vector<int>& corners);
 
 /// The law of the least energy from start to end [m] along `path` (M ≥ 2), outside the circle of `radius` [m] > 0.
 ///
@@ -150,7 +144,8 @@ struct CartDescent {
 /// centre line, where its slope counts as zero.
 /// \returns iterations done
 /// \throws Error where an argument is out of its range
-int cart_descent(const VectorRef& lower, const VectorRef& upper, VectorXd& x, const CartDescent& options = {});
+int cart_descent(const std::vector<double>& lower, const std::vector<double>& upper, std::vector<double>& x,
+                 const CartDescent& options = {});
 
 SIGMAIK_SAME_LAYOUT(CartLaw, CartOptions, CartRegion, CartDescent, PlanarPath);
 

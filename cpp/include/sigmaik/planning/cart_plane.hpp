@@ -14,37 +14,37 @@
 #include <array>
 #include <limits>
 #include <optional>
-
-#include <Eigen/Core>
+#include <vector>
 
 #include <sigmaik/layout.hpp>
 #include <sigmaik/planning/cart.hpp>
 
 namespace sigmaik::planning {
 
-/// x and y.
-using PlanarPoint = Eigen::Matrix<double, 2, 1, kLayout>;
+/// A number for each axis of the cart.
+using AxisPair = std::array<double, 2>;
+inline constexpr double kUnlimited = std::numeric_limits<double>::infinity();
 
 /// What a motion in the plane must keep to.
 struct PlaneCartOptions {
-  PlanarPoint lower = PlanarPoint::Constant(-std::numeric_limits<double>::infinity());  ///< [m] of each axis
-  PlanarPoint upper = PlanarPoint::Constant(std::numeric_limits<double>::infinity());   ///< [m]; equal: it stands
-  double margin = 0.0;  ///< [m] ≥ 0, added to the radius
-  double max_radius =
-      std::numeric_limits<double>::infinity();  ///< [m] > radius + margin, the farthest that the point may be
+  AxisPair lower{-kUnlimited, -kUnlimited};  ///< [m] of each axis
+  AxisPair upper{kUnlimited, kUnlimited};    ///< [m]; equal: the axis stands
+  double margin = 0.0;                       ///< [m] ≥ 0, added to the radius
+  double max_radius = kUnlimited;            ///< [m] > radius + margin, the farthest that the point may be
   /// [rad] by which the point's azimuth turns seen from the axis, positive about z, to within half a turn; none: any.
   std::optional<double> turn = std::nullopt;
-  double duration = 1.0;  ///< [s] between the first and the last sample
-  PlanarPoint max_speed = PlanarPoint::Constant(std::numeric_limits<double>::infinity());  ///< [m/s] > 0
+  double duration = 1.0;                       ///< [s] between the first and the last sample
+  AxisPair max_speed{kUnlimited, kUnlimited};  ///< [m/s] > 0 of each axis
   /// [m/s²] > 0 of each axis, second differences of the samples
-  PlanarPoint max_acceleration = PlanarPoint::Constant(std::numeric_limits<double>::infinity());
+  AxisPair max_acceleration{kUnlimited, kUnlimited};
   bool at_rest = false;  ///< starts and stops within max_acceleration, where that is finite
 };
 
 /// A motion of the cart.
 struct PlaneCartLaw {
-  PlanarPath c;         ///< (M, 2) [m]
-  VectorXd push;        ///< (M,) [m] ≥ 0: (2c_i − c_{i−1} − c_{i+1}) along c_i − f_i, where it touches the disc, else 0
+  std::vector<double> c;  ///< (M, 2) in C order [m]
+  std::vector<double>
+      push;             ///< (M,) [m] ≥ 0: (2c_i − c_{i−1} − c_{i+1}) along c_i − f_i, where it touches the disc, else 0
   double energy = 0.0;  ///< [m²] Σ |Δc|²
   double turn = 0.0;    ///< [rad] of the point's azimuth
   int starts = 0;       ///< first guesses tried
@@ -61,7 +61,7 @@ struct PlaneCartLaw {
 /// best without them.
 /// \throws CartError with the reason where none was found
 /// \throws Error where an argument is out of its range
-PlaneCartLaw plane_cart_law(const PlanarPath& path, const PlanarPoint& start, const PlanarPoint& end, double radius,
+PlaneCartLaw plane_cart_law(const PlanarPath& path, const AxisPair& start, const AxisPair& end, double radius,
                             const PlaneCartOptions& options = {});
 
 SIGMAIK_SAME_LAYOUT(PlaneCartLaw, PlaneCartOptions);

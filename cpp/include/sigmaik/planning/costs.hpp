@@ -31,6 +31,10 @@ JointCostPtr geometry_aware_cost(const Chain& chain, double k, double weight = 1
 /// \throws Error where a parameter is out of its range
 JointCostPtr log_manipulability_cost(const Chain& chain, double weight = 1.0);
 
+/// factor · cost, with its gradient and Hessian.
+/// \throws Error where the factor is not finite or negative, or there is no cost
+JointCostPtr scaled_cost(double factor, JointCostPtr cost);
+
 /// Σ of costs for the same joints.
 /// \throws Error where there is none, or their numbers of joints differ
 JointCostPtr sum_of_costs(std::vector<JointCostPtr> costs);

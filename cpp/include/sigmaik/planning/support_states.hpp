@@ -10,11 +10,14 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include <sigmaik/chain.hpp>
 #include <sigmaik/layout.hpp>
 #include <sigmaik/planning/batch_cost.hpp>
+#include <sigmaik/planning/collision_check.hpp>
+#include <sigmaik/planning/trajectory.hpp>
 #include <sigmaik/types.hpp>
 
 namespace sigmaik::planning {
@@ -34,6 +37,12 @@ struct GradientOptions {
   double prior_weight = 10.0;  ///< > 0: what ‖q − μ‖² in K̄⁻¹ weighs against the cost
   int max_iterations = 100;    ///< ≥ 1
   double tolerance = 1e-4;     ///< ≥ 0: stops where an iteration gains less than this part of the objective
+  /// ≥ 0: plan() tries this many first guesses drawn from the prior where the motion found from the straight line
+  /// touches an obstacle
+  int restarts = 8;
+  /// [s] > 0 of plan()'s motion; none: the shortest that keeps the limits of velocity and acceleration, 1 s where there
+  /// are none
+  std::optional<double> duration = std::nullopt;
 };
 
 /// Settings of SupportPlanner::stochastic().
@@ -46,14 +55,19 @@ struct StochasticOptions {
   double temperature = 0.1;    ///< > 0: λ of the weights exp(−(G − G_min)/(λ (G_max − G_min))) (15), normalised
   double prior_weight = 10.0;  ///< ≥ 0: as for the gradient; it keeps joints that the cost does not see from drifting
   double tolerance = 1e-3;     ///< ≥ 0: stops where eight iterations together gain less than this part of the objective
-  std::uint64_t seed = 0;      ///< of the random numbers: the same seed gives the same plan
+  std::uint64_t seed = 0;      ///< the same seed gives the same motion
+  bool refine = false;         ///< plan() finishes with gradient() from the motion found
+  std::optional<double> duration = std::nullopt;  ///< [s] as for the gradient
 };
 
-/// Plans for one arm and one cost, with the covariance's factors made once. One a thread.
+/// Plans for one arm and one cost, and keeps the covariance's factors. One object serves one thread.
 class SupportPlanner {
  public:
-  /// \throws Error where the number of states is out of its range, or the cost is for another number of joints
-  SupportPlanner(Chain chain, BatchCostPtr cost, int states);
+  /// \param obstacles what plan()'s motions must not touch; their cost is part of `cost` (collision_cost())
+  /// \throws Error where the number of states is out of its range, or the cost or the obstacles' spheres are for
+  /// another
+  ///     number of joints
+  SupportPlanner(Chain chain, BatchCostPtr cost, int states, std::optional<CollisionCheck> obstacles = std::nullopt);
   ~SupportPlanner();
   /// Takes over the memory of another; the other may only be destroyed or assigned to.
   SupportPlanner(SupportPlanner&&) noexcept;
@@ -76,7 +90,19 @@ class SupportPlanner {
   /// \throws Error as gradient()
   SupportStates draw(const JointVector& start, const JointVector& goal, double deviation, std::uint64_t seed);
 
-  /// Number of support states.
+  /// The motion of gradient() from the straight line: the natural spline through its states, timed, within the position
+  /// limits between the states too, with its clearance from singularities. Where it touches an obstacle, first guesses
+  /// are drawn from the prior, the same ones each time, and the motion of least cost that touches none is the answer.
+  /// The status is Failed where all of them touch, Optimal where the search stopped by itself, else Feasible. The cost
+  /// is the objective.
+  /// \throws Error as gradient(), or where start or goal touches an obstacle
+  Trajectory plan(const JointVector& start, const JointVector& goal, const GradientOptions& options);
+
+  /// The same for stochastic(). The status is Feasible unless the motion was refined: no minimum is claimed. Where the
+  /// refined motion touches an obstacle between its states, the answer is the motion before.
+  /// \throws Error as stochastic(), or where start or goal touches an obstacle
+  Trajectory plan(const JointVector& start, const JointVector& goal, const StochasticOptions& options);
+
   int states() const noexcept;
   /// The arm.
   const Chain& chain() const noexcept;

@@ -18,13 +18,16 @@
 /// they do not know h, so that a Newton step is one Riccati recursion with one more column for h. Answers are local
 /// minima.
 
-#include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include <sigmaik/chain.hpp>
 #include <sigmaik/layout.hpp>
+#include <sigmaik/planning/collision_check.hpp>
 #include <sigmaik/planning/joint_cost.hpp>
+#include <sigmaik/planning/trajectory.hpp>
+#include <sigmaik/singularities.hpp>
 
 namespace sigmaik::planning {
 
@@ -36,8 +39,10 @@ struct TimeOptimalOptions {
   double tolerance = 1e-9;     ///< in [1e-12, 1e-2]: what is left to gain, as a part of the objective between the ends
   int max_iterations = 500;    ///< ≥ 1, Newton steps of a start
   bool between_nodes = true;   ///< positions keep their limits between the nodes too; false: as in the paper
-  /// Where the way found still leads through what the cost marks, look on either side of it too, and keep the best.
+  /// Where the motion found still leads through what the cost marks, look on its other sides too, and keep the best.
   bool restarts = true;
+  /// [1/rad²] > 0, η₂ of plan()'s clearance: see clearance()
+  double clearance_width = 400.0;
 };
 
 /// Ends of a motion, and where to look for it.
@@ -50,17 +55,7 @@ struct TimeOptimalProblem {
   JointVector bend;
 };
 
-/// How a solve ended.
-enum class PlanStatus : std::int8_t {
-  Optimal = 0,   ///< a local minimum, to the tolerance
-  Feasible = 1,  ///< stopped before: within all constraints, but there is something to gain
-  Failed = 2,    ///< no motion within the constraints was found, and none is returned
-};
-
-/// "optimal", "feasible", "failed".
-const char* to_string(PlanStatus status) noexcept;
-
-/// A motion on nodes t_k = k h.
+/// A motion on nodes t_k = k h, without what lies between them.
 struct TimeOptimalResult {
   PlanStatus status = PlanStatus::Failed;  ///< what solve() did
   double duration = 0.0;                   ///< [s] t_F = N h
@@ -80,21 +75,42 @@ class TimeOptimal {
   /// \throws Error where an option is out of its range, the cost is for another number of joints, or nothing bounds a
   ///     joint's acceleration
   TimeOptimal(Chain chain, JointCostPtr cost, const TimeOptimalOptions& options = {});
+  /// The same with the arm's singular sets, for plan(); the other constructor takes SingularSets::of(chain).
+  /// \param obstacles what plan()'s motions must not touch; their cost is part of `cost` (collision_cost())
+  /// \throws Error also where the sets or the obstacles' spheres are for another number of joints
+  TimeOptimal(Chain chain, JointCostPtr cost, const TimeOptimalOptions& options, std::optional<SingularSets> sets,
+              std::optional<CollisionCheck> obstacles = std::nullopt);
   ~TimeOptimal();
   /// Takes over the memory of another; the other may only be destroyed or assigned to.
   TimeOptimal(TimeOptimal&&) noexcept;
   /// Takes over the memory of another; the other may only be destroyed or assigned to.
   TimeOptimal& operator=(TimeOptimal&&) noexcept;
 
+  /// The motion's nodes. With `restarts`, a motion whose most expensive node still costs much is solved again from
+  /// first guesses that are bent to either side of this node.
   /// \throws Error where an end is outside its limits, not finite or of a wrong size
   TimeOptimalResult solve(const TimeOptimalProblem& problem);
 
-  /// The arm.
+  /// The motion with its clearance from singularities between the nodes. With `restarts`, a motion that crosses a
+  /// singular set where it need not is solved once more, from the other side of the first such crossing; of the two the
+  /// answer is the one with the smaller along(), as nodes may lie on either side of a wall that the motion between them
+  /// goes through. A motion that touches an obstacle between its nodes has failed.
+  /// \throws Error as solve(), or where start or goal touches an obstacle
+  Trajectory plan(const TimeOptimalProblem& problem);
+
+  /// \throws Error where an end is outside its limits, not finite or of a wrong size
+  void check(const TimeOptimalProblem& problem) const;
+
+  /// The objective with the cost counted all along the motion, ten times a step, and not at the nodes alone; +inf where
+  /// the plan failed.
+  double along(const Trajectory& trajectory) const;
+
   const Chain& chain() const noexcept { return chain_; }
   /// L, or null for none.
   const JointCostPtr& cost() const noexcept { return cost_; }
   /// The settings, as given.
   const TimeOptimalOptions& options() const noexcept { return options_; }
+  const std::optional<SingularSets>& sets() const noexcept { return sets_; }
 
   /// One start of the method, for one width of vectors.
   class Engine {
@@ -105,13 +121,16 @@ class TimeOptimal {
   };
 
  private:
-  void check(const TimeOptimalProblem& problem) const;
   JointVector way_out(const TimeOptimalResult& found) const;
   TimeOptimalResult stand(const TimeOptimalProblem& problem) const;
+  Trajectory timed_plan(const TimeOptimalProblem& problem);
+  Trajectory best_plan(const TimeOptimalProblem& problem);
 
   Chain chain_;
   JointCostPtr cost_;
   TimeOptimalOptions options_;
+  std::optional<SingularSets> sets_;
+  std::optional<CollisionCheck> obstacles_;
   std::unique_ptr<Engine> engine_;
 };
 

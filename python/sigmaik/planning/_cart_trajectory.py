@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import TYPE_CHECKING, Literal, TypedDict
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,6 +17,10 @@ from sigmaik._types import Array
 
 from .cart import CartMotion, cart_motion
 from .cart_path import PosePath, pose_paths, smooth, when_smooth
+from .options import checked
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 __all__ = ["CartTrajectory", "Shape", "ShoulderCylinder", "cart_trajectory", "follow", "shoulder_cylinder"]
 Shape = Literal["line", "spline"]
@@ -112,7 +116,78 @@ class CartTrajectory:
     """[rad] by which the arm missed taught joints at most, on arriving; it goes on from where it arrived."""
 
 
+class CartTrajectoryKeywords(TypedDict, total=False):
+    """Options of `cart_trajectory`."""
+
+    poses: ArrayLike | None
+    """(N, 4, 4) of the tool where they were taught, x along the cart; by default those of `taught`."""
+    point: ArrayLike
+    """(3,) [m] of the arm in the tip's frame, that is to stay out of the cylinder. The default, the tip's origin,
+    is the paper's. `shoulder_cylinder(chain)` has the point and the least radius that suit the arm."""
+    mount: ArrayLike | None
+    """(4, 4) base of the chain on the cart, at cart position 0; by default the cart's frame."""
+    tool: ArrayLike | None
+    """(4, 4) in the tip's frame; by default the tip."""
+    durations: float | Sequence[float]
+    """[s] of each motion, or one for all."""
+    samples: int | Sequence[int]
+    """of each motion, its ends among them, or one number for all. Neighbours share a sample."""
+    shape: Shape
+    """"line"; "spline", one natural cubic spline through all positions."""
+    via: Sequence[ArrayLike | None] | None
+    """(N − 1) a point (3,) [m] that the motion goes through on a circular arc, or None for a line."""
+    profile: Profile
+    """"constant" speed along the path, as in the paper; "smooth" from rest to rest, of cart, tool and joints."""
+    margin: float
+    """See `cart_motion`. With "smooth" the acceleration is that of the whole motion."""
+    cart_range: tuple[float, float]
+    """See `cart_motion`. With "smooth" the acceleration is that of the whole motion."""
+    max_speed: float
+    """See `cart_motion`. With "smooth" the acceleration is that of the whole motion."""
+    max_acceleration: float
+    """See `cart_motion`. With "smooth" the acceleration is that of the whole motion."""
+    pose_tolerance: float
+    """[m or rad] by which the poses of `taught` may differ from `poses`."""
+    joint_tolerance: float
+    """[rad] by which the arm may miss the taught joints."""
+    check_limits: bool
+    """Refuse motions out of the joints' limits of position and velocity."""
+
+
 def cart_trajectory(
+    chain: Chain, taught: ArrayLike, radius: float, **options: Unpack[CartTrajectoryKeywords]
+) -> CartTrajectory:
+    """From taught configuration to taught configuration along Cartesian motions, arriving at the taught joints.
+
+    For each pair of neighbours: the tool's motion p(t); the law of the cart that keeps `point` more than `radius` from
+    the first joint's axis, on the side that turns joint 1 as taught (`cart_motion`); the arm's inverse kinematics on
+    p(t) shifted by the cart (9), continuous from the taught start; and a check that it arrives at the taught joints,
+    not at another branch or another turn.
+
+    Parameters
+    ----------
+    chain
+        The arm, six revolute joints, the first about an axis that is parallel to z once mounted.
+    taught
+        (N, 7) N ≥ 2 configurations: the cart [m], the joints [rad].
+    radius
+        [m] of the cylinder.
+    options
+        `CartTrajectoryKeywords`: poses, point, mount, tool, durations, samples, shape, via, profile, margin,
+        cart_range, max_speed, max_acceleration, pose_tolerance, joint_tolerance, check_limits.
+
+    Raises
+    ------
+    CartError
+        where no law of the cart keeps out of the cylinder; see `cart_motion`.
+    ValueError
+        where the arm cannot follow, arrives at other joints, or leaves its limits; or where an argument is out of its
+        range.
+    """
+    return _through(chain, taught, radius, **checked("cart_trajectory", CartTrajectoryKeywords, options, None))
+
+
+def _through(
     chain: Chain,
     taught: ArrayLike,
     radius: float,
@@ -134,57 +209,6 @@ def cart_trajectory(
     joint_tolerance: float = 1e-4,
     check_limits: bool = True,
 ) -> CartTrajectory:
-    """From taught configuration to taught configuration along Cartesian motions, arriving at the taught joints.
-
-    For each pair of neighbours: the tool's motion p(t); the law of the cart that keeps `point` more than `radius` from
-    the first joint's axis, on the side that turns joint 1 as taught (`cart_motion`); the arm's inverse kinematics on
-    p(t) shifted by the cart (9), continuous from the taught start; and a check that it arrives at the taught joints,
-    not at another branch or another turn.
-
-    Parameters
-    ----------
-    chain
-        The arm, six revolute joints, the first about an axis that is parallel to z once mounted.
-    taught
-        (N, 7) N ≥ 2 configurations: the cart [m], the joints [rad].
-    radius
-        [m] of the cylinder.
-    poses
-        (N, 4, 4) of the tool where they were taught, x along the cart; by default those of `taught`.
-    point
-        (3,) [m] of the arm in the tip's frame, that is to stay out of the cylinder. The default, the tip's origin, is
-        the paper's. `shoulder_cylinder(chain)` has the point and the least radius that suit the arm.
-    mount
-        (4, 4) base of the chain on the cart, at cart position 0; by default the cart's frame.
-    tool
-        (4, 4) in the tip's frame; by default the tip.
-    durations
-        [s] of each motion, or one for all.
-    samples
-        of each motion, its ends among them, or one number for all. Neighbours share a sample.
-    shape
-        "line"; "spline", one natural cubic spline through all positions.
-    via
-        (N − 1) a point (3,) [m] that the motion goes through on a circular arc, or None for a line.
-    profile
-        "constant" speed along the path, as in the paper; "smooth" from rest to rest, of cart, tool and joints.
-    margin, cart_range, max_speed, max_acceleration
-        See `cart_motion`. With "smooth" the acceleration is that of the whole motion.
-    pose_tolerance
-        [m or rad] by which the poses of `taught` may differ from `poses`.
-    joint_tolerance
-        [rad] by which the arm may miss the taught joints.
-    check_limits
-        Refuse motions out of the joints' limits of position and velocity.
-
-    Raises
-    ------
-    CartError
-        where no law of the cart keeps out of the cylinder; see `cart_motion`.
-    ValueError
-        where the arm cannot follow, arrives at other joints, or leaves its limits; or where an argument is out of its
-        range.
-    """
     if chain.dof != 6:
         raise ValueError(f"the arm must have six joints, not {chain.dof}: a redundant one has no joints to arrive at")
     if profile not in ("constant", "smooth"):

@@ -1,4 +1,6 @@
-"""The same problem for a general solver: direct transcription in CasADi, solved by IPOPT with MUMPS (extra `plan`)."""
+"""The problem of `sk.planning.time_optimal` for a general solver, to compare with: direct transcription in CasADi,
+solved by IPOPT with MUMPS (extra `plan`). `time_optimal(solver="ipopt")` finds it by the entry point in
+pyproject.toml."""
 
 from __future__ import annotations
 
@@ -6,27 +8,151 @@ import functools
 import math
 import threading
 import time
-from typing import Any
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, TypeAlias
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from sigmaik import singularities
-from sigmaik._core import Chain
+from sigmaik._core import Chain, Clearance, Crossing, SingularSets, Trajectory, clearance
 from sigmaik._extras import need
 from sigmaik._types import Array
+from sigmaik.planning import costs
+from sigmaik.planning.costs import ETA1, ETA2
 
-from .objective import Ends, Objective, Sets
-
-__all__ = ["solve"]
+__all__ = ["plan"]
 
 TOLERATED = 1e-6
 """What constraints may be broken by, or the plan has failed."""
+DENSE = 10
+"""Samples of a step where clearance is measured."""
+BEND = 0.6
+"""[rad] by which the first guess of a second start is bent."""
+
+
+Sets: TypeAlias = SingularSets | None
+Ends: TypeAlias = tuple[ArrayLike, ArrayLike, ArrayLike | None, ArrayLike | None]
+"""Start, goal, and velocities there."""
+
+
+@dataclass(frozen=True)
+class Objective:
+    """All that a solver object depends on, but for the arm. Hashable: solvers are built once for each."""
+
+    avoid: str | None = None
+    nodes: int = 30
+    time_weight: float = 1.0
+    effort_weight: float = 1.0
+    avoid_weight: float = 1e2
+    epsilon: float = 1e-6
+    eta1: float = ETA1
+    eta2: float = ETA2
+    generic_manipulability: bool = False
+
+
+def plan(chain: Chain, sets: Sets, ends: Ends, options: Mapping[str, Any], avoid: Mapping[str, Any]) -> Trajectory:
+    """The motion from the straight line at an even speed, and, where it crosses a singular set that it need not and
+    `restarts` is not switched off, the better of it and of one from the other side, as in `TimeOptimal::plan`.
+
+    `options` and `avoid` are keywords of `time_optimal`; those that are no field of `Objective` do not count.
+    """
+    known = Objective.__dataclass_fields__
+    objective = Objective(**{name: value for name, value in {**options, **avoid}.items() if name in known})
+    if objective.avoid not in (None, "manipulability", "potential"):
+        raise ValueError(f"avoid = {objective.avoid!r} must be None, 'manipulability' or 'potential'")
+    if objective.avoid == "potential" and sets is None:
+        costs.Potential().bind_term(chain)  # says which arms are known
+    found = _one(chain, sets, objective, ends, None)
+    near = found.clearance
+    if (
+        objective.avoid is None
+        or sets is None
+        or near is None
+        or not near.avoidable
+        or not options.get("restarts", True)
+    ):
+        return found
+    start, goal = (np.asarray(x, dtype=np.float64) for x in ends[:2])
+    room = (
+        0.4 * (chain.limits.lower - np.minimum(start, goal)),
+        0.4 * (chain.limits.upper - np.maximum(start, goal)),
+    )
+    bend = np.clip(BEND * _other_side(sets, near.avoidable[0], start), *room)
+    other = _one(chain, sets, objective, ends, bend)
+    best = other if _along(other, sets, objective) < _along(found, sets, objective) else found
+    return _trajectory(
+        (best.q, best.qdot, best.qddot),
+        best.duration,
+        best.status,
+        best.cost,
+        found.solve_time + other.solve_time,
+        found.iterations + other.iterations,
+        2,
+        best.clearance,
+    )
+
+
+def _one(chain: Chain, sets: Sets, objective: Objective, ends: Ends, bend: Array | None) -> Trajectory:
+    q, qdot, qddot, status, cost, duration, iterations, solve_time = solve(chain, sets, objective, ends, bend)
+    if status == "failed":
+        empty = np.empty((0, chain.dof))
+        return Trajectory(np.empty(0), empty, empty, empty, math.nan, status, math.nan, solve_time, iterations)
+    found = _trajectory((q, qdot, qddot), duration, status, cost, solve_time, iterations, 1, None)
+    dense = np.linspace(0.0, found.t[-1], DENSE * (len(found.t) - 1) + 1)
+    near = clearance(chain, sets, dense, found.sample(dense)[0], width=objective.eta2)
+    return _trajectory((q, qdot, qddot), duration, status, cost, solve_time, iterations, 1, near)
+
+
+def _trajectory(
+    nodes: tuple[Array, Array, Array],
+    duration: float,
+    status: str,
+    cost: float,
+    solve_time: float,
+    iterations: int,
+    starts: int,
+    near: Clearance | None,
+) -> Trajectory:
+    t = np.arange(len(nodes[0]), dtype=np.float64) * (duration / len(nodes[0]))
+    return Trajectory(t, *nodes, duration, status, cost, solve_time, iterations, starts, clearance=near)
+
+
+def _other_side(sets: SingularSets, crossing: Crossing, start: Array) -> Array:
+    """Direction (n,), of length 1: back to the start's side of a wall; for other sets to where the motion is not."""
+    i = sets.names.index(crossing.name)
+    at = slice(sum(sets.codimensions[:i]), sum(sets.codimensions[: i + 1]))
+    step = 1e-6 * np.eye(sets.dof)
+    around = sets.signed_residuals(np.concatenate([crossing.q + step, crossing.q - step]))[:, at]
+    slope = (around[: sets.dof] - around[sets.dof :]).T / 2e-6  # (codimension, n)
+    if sets.codimensions[i] == 1:
+        aim = np.sign(sets.signed_residuals(start)[at])
+    else:
+        here = sets.signed_residuals(crossing.q)[at]
+        aim = -here if np.linalg.norm(here) > 1e-9 else np.eye(sets.codimensions[i])[0]
+    direction: Array = np.asarray(np.linalg.pinv(slope) @ aim, dtype=np.float64)
+    length = float(np.linalg.norm(direction))
+    return direction / length if length > 0.0 else direction
+
+
+def _along(found: Trajectory, sets: SingularSets, o: Objective) -> float:
+    """The objective with what is to be avoided counted all along the way; inf where the plan failed."""
+    if found.clearance is None:
+        return math.inf
+    dense = found.sample(found.clearance.t)[0]
+    if o.avoid == "potential":
+        avoided = o.avoid_weight * np.sum(sets.potential(dense, o.eta1, o.eta2))
+    else:
+        avoided = o.avoid_weight * np.sum(1.0 / (found.clearance.manipulability + o.epsilon))
+    motion = o.time_weight * found.duration + o.effort_weight * np.sum(found.qddot**2)
+    return float(motion + avoided / DENSE)
 
 
 def solve(
     chain: Chain, sets: Sets, objective: Objective, ends: Ends, bend: Array | None
 ) -> tuple[Array, Array, Array, str, float, float, int, float]:
-    """q, q̇, q̈ (N, n), status, cost, t_F, iterations, solve time. From the straight line, at an even speed."""
+    """q, q̇, q̈ (N, n), status, cost, t_F, iterations, solve time."""
     casadi = _casadi()
     n, count = chain.dof, objective.nodes
     limits = chain.limits

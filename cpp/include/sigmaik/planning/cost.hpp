@@ -1,0 +1,81 @@
+#pragma once
+/// \file cost.hpp
+/// Costs put together before it is known of which arm:
+///
+///     Cost cost = costs::Potential{} + 2.0 * costs::Collision{field} + costs::JointLimits{};
+///     Trajectory plan = time_optimal(arm, start, goal, cost);
+///
+/// A term is any type with `bind(chain)`, which makes a JointCost, or a BatchCost, of that chain's joints. So a new
+/// cost is a struct of its own; costs/ has those of the library.
+
+#include <concepts>
+#include <functional>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include <sigmaik/chain.hpp>
+#include <sigmaik/planning/batch_cost.hpp>
+#include <sigmaik/planning/joint_cost.hpp>
+
+namespace sigmaik::planning {
+
+/// What a Cost is made of.
+template <typename T>
+concept CostTerm = requires(const T& term, const Chain& chain) {
+  { term.bind(chain) } -> std::convertible_to<BatchCostPtr>;
+};
+
+/// A weighted sum of terms. A value.
+class Cost {
+ public:
+  /// Nothing: costs nothing.
+  Cost() = default;
+  /// One term. Implicit, so that terms add up.
+  template <typename Term>
+    requires(!std::same_as<Term, Cost> && CostTerm<Term>)
+  Cost(Term term)
+      : Cost(Bind([term = std::move(term)](const Chain& chain) -> BatchCostPtr { return term.bind(chain); })) {}
+  /// A cost that is made already, of one arm's joints.
+  template <std::derived_from<BatchCost> Made>
+  Cost(std::shared_ptr<Made> cost) {
+    if (cost) parts_.push_back({1.0, [cost = BatchCostPtr(std::move(cost))](const Chain&) { return cost; }});
+  }
+
+  bool empty() const noexcept { return parts_.empty(); }
+
+  /// The sum for one arm: a JointCost where every term is one, null where there are none.
+  /// \throws Error where a term does not fit the chain
+  BatchCostPtr bind(const Chain& chain) const;
+  /// The sum for planners that need Hessians.
+  /// \throws Error also where a term is no JointCost
+  JointCostPtr bind_smooth(const Chain& chain) const;
+
+  Cost& operator+=(const Cost& other);
+  /// \throws Error where the factor is not finite or negative
+  Cost& operator*=(double factor);
+
+ private:
+  using Bind = std::function<BatchCostPtr(const Chain&)>;
+  explicit Cost(Bind bind) { parts_.push_back({1.0, std::move(bind)}); }
+
+  struct Part {
+    double factor;
+    Bind bind;
+  };
+  std::vector<Part> parts_;
+};
+
+inline Cost operator+(Cost a, const Cost& b) { return a += b; }
+/// \throws Error where the factor is not finite or negative
+inline Cost operator*(double factor, Cost cost) { return cost *= factor; }
+inline Cost operator*(Cost cost, double factor) { return cost *= factor; }
+
+/// The library's terms.
+namespace costs {
+// Found for two terms, of which neither is a Cost yet.
+using planning::operator+;
+using planning::operator*;
+}  // namespace costs
+
+}  // namespace sigmaik::planning
