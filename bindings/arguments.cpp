@@ -167,4 +167,12 @@ Indices indices(std::uint32_t bits) {
   return py::tuple(out);
 }
 
+void warn(const std::vector<std::string>& sentences) {
+  if (sentences.empty()) return;
+  const py::object category = py::module_::import("sigmaik._core").attr("ModelWarning");
+  for (const std::string& sentence : sentences) {
+    if (PyErr_WarnEx(category.ptr(), sentence.c_str(), 1) != 0) throw py::error_already_set();
+  }
+}
+
 }  // namespace sigmaik::bindings

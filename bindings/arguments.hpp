@@ -134,6 +134,10 @@ bool load_method(py::handle object, Method& method);
 
 py::object method_to_python(const Method& method);
 
+/// Python's warnings, of the category sigmaik.ModelWarning, at the line that called us. Throws where the user made
+/// errors of them.
+void warn(const std::vector<std::string>& sentences);
+
 void bind_status(py::module_& m);
 void bind_chain(py::module_& m);
 void bind_methods(py::module_& m);

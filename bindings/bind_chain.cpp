@@ -1,4 +1,7 @@
 #include <cmath>
+#include <locale>
+#include <sstream>
+#include <utility>
 #include <vector>
 
 #include "arguments.hpp"
@@ -38,7 +41,24 @@ void bind_limits(py::module_& m) {
           "acceleration", [](const JointLimits& l) { return to_numpy(l.acceleration); }, "(n,) [rad/s² or m/s²]")
       .def_property_readonly(
           "jerk", [](const JointLimits& l) { return to_numpy(l.jerk); }, "(n,) [rad/s³ or m/s³]")
-      .def_property_readonly("effort", [](const JointLimits& l) { return to_numpy(l.effort); }, "(n,) [N·m or N]");
+      .def_property_readonly(
+          "effort", [](const JointLimits& l) { return to_numpy(l.effort); }, "(n,) [N·m or N]")
+      .def("__repr__", [](const JointLimits& l) {
+        std::ostringstream text;
+        text.imbue(std::locale::classic());
+        text.precision(4);
+        text << "JointLimits(";
+        const char* separator = "";
+        for (const auto& [name, values] :
+             {std::pair{"lower", &l.lower}, std::pair{"upper", &l.upper}, std::pair{"velocity", &l.velocity},
+              std::pair{"acceleration", &l.acceleration}, std::pair{"jerk", &l.jerk}, std::pair{"effort", &l.effort}}) {
+          text << separator << name << "=[";
+          for (int i = 0; i < values->size(); ++i) text << (i > 0 ? ", " : "") << (*values)[i];
+          text << "]";
+          separator = ",\n            ";
+        }
+        return text.str() + ")";
+      });
 }
 
 void bind_inertia(py::module_& m) {
@@ -106,7 +126,9 @@ void bind_from_urdf(py::class_<Chain>& cls) {
           }
           limits.assign(array.data(), array.data() + array.size());
         }
-        return Chain::from_urdf(text, base.value_or(""), tip.value_or(""), limits);
+        const Chain chain = Chain::from_urdf(text, base.value_or(""), tip.value_or(""), limits);
+        warn(chain.warnings());
+        return chain;
       },
       py::arg("source"), py::arg("base") = py::none(), py::arg("tip") = py::none(),
       py::arg("acceleration") = py::none(),
@@ -115,7 +137,8 @@ void bind_from_urdf(py::class_<Chain>& cls) {
       "base, tip: link names; by default the root, and the only leaf.\n"
       "acceleration: (n,) limits [rad/s² or m/s²]; by default those of the file, whose <limit> elements may carry\n"
       "an attribute `acceleration` (an extension), else infinite.\n\n"
-      "Raises Error with the facts for anything that is not a usable serial arm of 1 to 16 movable joints.");
+      "Raises Error with the facts for anything that is not a usable serial arm of 1 to 16 movable joints, and warns\n"
+      "(ModelWarning) of velocity limits of zero, which count as none, and of inertias that no rigid body has.");
 }
 
 void bind_parts(py::class_<Chain>& cls) {
@@ -138,6 +161,12 @@ void bind_parts(py::class_<Chain>& cls) {
           [](const Chain& c) -> py::typing::Tuple<Segment, py::ellipsis> { return py::tuple(py::cast(c.segments())); },
           "Everything between base and tip, fixed joints included.")
       .def_property_readonly("limits", &Chain::limits, "Limits of the movable joints.")
+      .def_property_readonly(
+          "warnings", [](const Chain& c) -> Strings { return py::tuple(py::cast(c.warnings())); },
+          "What is wrong with the model and does not keep the arm from moving, one sentence each.")
+      .def_property_readonly(
+          "missing_limits", [](const Chain& c) -> Strings { return py::tuple(py::cast(c.missing_limits())); },
+          "Velocity and acceleration limits that joints lack, one sentence a kind: a servo cannot hold these.")
       .def(
           "with_limits",
           [](const Chain& c, const MaybeArray& lower, const MaybeArray& upper, const MaybeArray& velocity,

@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <set>
+#include <sstream>
 
 #include "message.hpp"
+#include "rigid_body.hpp"
 
 namespace sigmaik {
 namespace {
@@ -118,6 +120,12 @@ const char* to_string(JointType type) noexcept {
 Chain::Chain(std::string base, std::vector<Segment> segments) {
   prepare(base, segments);
   auto model = std::make_shared<Model>();
+  for (const Segment& s : segments) {
+    model->warnings.insert(model->warnings.end(), s.notes.begin(), s.notes.end());
+    if (const std::string defect = s.inertia ? detail::inertia_defect(*s.inertia) : ""; !defect.empty()) {
+      model->warnings.push_back("link '" + s.link_name + "': its inertia is no rigid body's: " + defect);
+    }
+  }
   const auto is_movable = [](const Segment& s) { return s.type != JointType::Fixed; };
   const int n = static_cast<int>(std::count_if(segments.begin(), segments.end(), is_movable));
   model->dof = n;
@@ -177,9 +185,49 @@ Chain Chain::with_limits(const JointLimits& limits) const {
     s.acceleration = limits.acceleration[i];
     s.jerk = limits.jerk[i];
     s.effort = limits.effort[i];
+    s.notes.clear();  // they told of the limits that these replace
     ++i;
   }
   return Chain(model_->base, std::move(segments));
+}
+
+std::vector<std::string> Chain::missing_limits() const {
+  const auto sentence = [this](const char* kind, const JointVector& values, const char* consequence) {
+    std::string joints;
+    int missing = 0;
+    for (int i = 0; i < dof(); ++i) {
+      if (std::isfinite(values[i])) continue;
+      joints += (missing++ > 0 ? ", '" : "'") + joint_names()[static_cast<std::size_t>(i)] + "'";
+    }
+    if (missing == 0) return std::string();
+    if (missing == dof()) joints = "the joints";
+    return joints + (missing == 1 ? " has" : " have") + " no " + kind + " limit: " + consequence + ". with_limits(" +
+           kind + "=…) gives limits";
+  };
+  std::vector<std::string> sentences;
+  for (std::string text :
+       {sentence("velocity", limits().velocity, "nothing bounds how fast a command moves them"),
+        sentence("acceleration", limits().acceleration, "a command may change their velocity at once")}) {
+    if (!text.empty()) sentences.push_back(std::move(text));
+  }
+  return sentences;
+}
+
+std::vector<std::string> Chain::far_outside_limits(const JointRef& q) const {
+  require(q.size() == dof(), "q has ", q.size(), " entries, the chain ", dof(), " joints");
+  std::vector<std::string> sentences;
+  for (int i = 0; i < dof(); ++i) {
+    const double beyond = std::max(limits().lower[i] - q[i], q[i] - limits().upper[i]);
+    if (!(beyond > 1.0)) continue;
+    const bool angle = joint_types()[static_cast<std::size_t>(i)] != JointType::Prismatic;
+    std::ostringstream text;
+    text.imbue(std::locale::classic());
+    text << "joint '" << joint_names()[static_cast<std::size_t>(i)] << "' starts at " << q[i]
+         << (angle ? " rad, " : " m, ") << beyond << " outside its limits [" << limits().lower[i] << ", "
+         << limits().upper[i] << "]" << (angle ? "; are these degrees?" : "; are these millimetres?");
+    sentences.push_back(text.str());
+  }
+  return sentences;
 }
 
 }  // namespace sigmaik

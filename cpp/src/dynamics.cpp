@@ -11,6 +11,7 @@
 #include <sigmaik/kdl.hpp>
 
 #include "message.hpp"
+#include "rigid_body.hpp"
 
 namespace sigmaik {
 namespace {
@@ -28,23 +29,6 @@ KDL::JntArray joints(const JointRef& values, int n, const char* what) {
   KDL::JntArray array(static_cast<unsigned>(n));
   entries(array) = values;
   return array;
-}
-
-// The principal moments of a body are ∫ (y² + z²) dm, ∫ (z² + x²) dm and ∫ (x² + y²) dm, so that no moment is larger
-// than the sum of the other two.
-void check_payload(const Inertia& payload) {
-  const Eigen::Matrix3d& t = payload.tensor;
-  detail::require(std::isfinite(payload.mass) && payload.mass >= 0.0, "payload: mass = ", payload.mass,
-                  " must be finite and not negative");
-  detail::require(payload.center_of_mass.allFinite() && t.allFinite(), "payload: an entry is not finite");
-  const double slack = 1e-9 * t.cwiseAbs().maxCoeff();  // rounding of a data sheet's numbers
-  detail::require((t - t.transpose()).cwiseAbs().maxCoeff() <= slack, "payload: the tensor is not symmetric");
-  const Eigen::Vector3d moments = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(t, Eigen::EigenvaluesOnly)
-                                      .eigenvalues();
-  detail::require(moments[0] >= -slack && moments[2] <= moments[0] + moments[1] + slack, "payload: principal moments ",
-                  moments[0], ", ", moments[1], ", ", moments[2],
-                  " are no body's: none is negative, nor more than the sum of the other two");
-  detail::require(payload.mass > 0.0 || t.isZero(0.0), "payload: a tensor without mass");
 }
 
 }  // namespace
@@ -90,7 +74,10 @@ struct Dynamics::Model {
 
 Dynamics::Dynamics(const Chain& chain, const Eigen::Vector3d& gravity, const std::optional<Inertia>& payload) {
   detail::require(gravity.allFinite(), "gravity has an entry that is not finite");
-  if (payload) check_payload(*payload);
+  if (payload) {
+    const std::string defect = detail::inertia_defect(*payload);
+    detail::require(defect.empty(), "payload: ", defect);
+  }
   std::string waiting;  // the last movable joint, if no link after the joint has an inertia yet
   const auto check = [&] {
     detail::require(waiting.empty(), "joint '", waiting, "' carries no link whose inertia is known: no dynamics");

@@ -55,6 +55,11 @@ void read_limits(const TreeJoint& from, const urdf::Joint& joint, Segment& segme
   const XMLElement* const limit = from.element->FirstChildElement("limit");
   if (limit == nullptr) return;  // a continuous joint: urdfdom requires <limit> of all other types
   segment.velocity = none_if_zero(joint.limits->velocity);
+  // URDF wants an effort, so 0 is how files leave it out; a velocity of 0 may be meant.
+  if (joint.limits->velocity == 0.0 && limit->Attribute("velocity") != nullptr) {
+    segment.notes.push_back(from.label() +
+                            ": velocity = 0 counts as no limit; a joint that does not move is of type fixed");
+  }
   segment.effort = none_if_zero(joint.limits->effort);
   if (limit->Attribute("acceleration") != nullptr) {
     segment.acceleration = none_if_huge(number(from.label(), *limit, "acceleration"));

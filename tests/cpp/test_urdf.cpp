@@ -315,6 +315,49 @@ TEST_CASE("limits that contradict themselves or are not there") {
   check_facts(refusal(arm(kLimit + kLimit)), {"'j2'", "second <limit>"});
 }
 
+TEST_CASE("a chain says what is wrong with its model, and which limits it lacks") {
+  CHECK(Chain::from_urdf(arm(kLimit)).warnings().empty());
+  const std::string zero = "<limit lower='-1' upper='2' velocity='0' effort='0'/>";
+  const Chain still = Chain::from_urdf(arm(zero));
+  REQUIRE(still.warnings().size() == 1);
+  CHECK(still.warnings()[0] ==
+        "joint 'j2': velocity = 0 counts as no limit; a joint that does not move is of type fixed");
+  CHECK(still.limits().velocity[1] == kInfinity);
+
+  REQUIRE(still.missing_limits().size() == 2);
+  CHECK(still.missing_limits()[0].find("'j2' has no velocity limit") == 0);
+  CHECK(still.missing_limits()[1].find("the joints have no acceleration limit") == 0);
+  sigmaik::JointLimits limits = still.limits();
+  limits.velocity.setConstant(1.0);
+  limits.acceleration.setConstant(10.0);
+  const Chain complete = still.with_limits(limits);
+  CHECK(complete.missing_limits().empty());
+  CHECK(complete.warnings().empty());
+
+  const std::string impossible =
+      "<inertial><mass value='1'/><inertia ixx='1' iyy='1' izz='3' ixy='0' ixz='0' iyz='0'/></inertial>";
+  const Chain heavy = Chain::from_urdf(robot(link("base") + link("a", impossible) + link("tip") +
+                                             joint("j1", "revolute", "base", "a", kLimit) +
+                                             joint("j2", "revolute", "a", "tip", kLimit)));
+  REQUIRE(heavy.warnings().size() == 1);
+  CHECK(heavy.warnings()[0].find("link 'a': its inertia is no rigid body's: principal moments 1, 1, 3") == 0);
+}
+
+TEST_CASE("a start far outside the limits is rather a mistake of units") {
+  const Chain chain = Chain::from_urdf(arm(kLimit));  // [-1, 2] rad, both
+  sigmaik::JointVector q(2);
+  q << 2.9, -1.9;
+  CHECK(chain.far_outside_limits(q).empty());
+  q << 90.0, -2.5;
+  const std::vector<std::string> sentences = chain.far_outside_limits(q);
+  REQUIRE(sentences.size() == 2);
+  CHECK(sentences[0] == "joint 'j1' starts at 90 rad, 88 outside its limits [-1, 2]; are these degrees?");
+  CHECK(sentences[1].find("joint 'j2' starts at -2.5 rad, 1.5 outside") == 0);
+  q << 0.0, std::nan("");
+  CHECK(chain.far_outside_limits(q).empty());  // reset() refuses NaN
+  CHECK_THROWS_AS(chain.far_outside_limits(q.head(1)), sigmaik::Error);
+}
+
 TEST_CASE("huge limits are none") {
   const Chain chain = Chain::from_urdf(
       arm("<limit lower='-1e16' upper='1.7976931348623157e308' velocity='1e9' effort='9.9e8' acceleration='1e16'"

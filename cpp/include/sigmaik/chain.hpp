@@ -42,6 +42,8 @@ struct Segment {
   double jerk = std::numeric_limits<double>::infinity();          ///< [rad/s³ or m/s³], > 0
   double effort = std::numeric_limits<double>::infinity();        ///< [N·m or N], > 0
   std::optional<Inertia> inertia;                                 ///< of the link, where it is known
+  /// What a reader made of values that say nothing, one sentence each: the chain hands them on as warnings().
+  std::vector<std::string> notes;
 };
 
 /// Limits of the movable joints, base to tip, infinite where there is none.
@@ -99,6 +101,19 @@ class Chain {
   /// \throws Error where sizes or values do not fit
   Chain with_limits(const JointLimits& limits) const;
 
+  /// What is wrong with the model and does not keep the arm from moving, one sentence each: limits of zero in a URDF,
+  /// which count as none, and inertias that no rigid body has. Python warns of them when it reads a URDF.
+  const std::vector<std::string>& warnings() const noexcept { return model_->warnings; }
+
+  /// What a servo of this arm cannot hold, one sentence a kind of limit: velocity and acceleration limits that joints
+  /// lack. Python warns of them where a servo is made.
+  std::vector<std::string> missing_limits() const;
+
+  /// One sentence for each joint that is outside its position limits by more than 1 rad or 1 m at q (n,): a start there
+  /// is rather a mistake of units than a posture. Python warns of them where a servo is reset.
+  /// \throws Error where the size is wrong
+  std::vector<std::string> far_outside_limits(const JointRef& q) const;
+
   /// Constants of the kinematics: dof() joints, then the tip's frame in the last joint's.
   const std::array<JointConstants, kMaxJoints>& constants() const noexcept { return model_->constants; }
   /// The tip in the last movable joint's frame, at any q.
@@ -110,6 +125,7 @@ class Chain {
     std::vector<Segment> segments;
     std::vector<std::string> joint_names;
     std::vector<JointType> joint_types;
+    std::vector<std::string> warnings;
     JointLimits limits;
     int dof = 0;
     std::array<JointConstants, kMaxJoints> constants;
