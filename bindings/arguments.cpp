@@ -167,6 +167,19 @@ Indices indices(std::uint32_t bits) {
   return py::tuple(out);
 }
 
+std::string record(const char* name, std::initializer_list<std::pair<const char*, py::object>> values) {
+  std::string text = std::string(name) + "(";
+  const char* separator = "";
+  for (const auto& [key, value] : values) {
+    if (value.is_none()) continue;
+    const bool array = py::isinstance<py::array>(value);  // str: without the word array
+    text += std::string(separator) + key + (*key != '\0' ? "=" : "") +
+            (array ? py::str(value) : py::repr(value)).cast<std::string>();
+    separator = ", ";
+  }
+  return text + ")";
+}
+
 void warn(const std::vector<std::string>& sentences) {
   if (sentences.empty()) return;
   const py::object category = py::module_::import("sigmaik._core").attr("ModelWarning");

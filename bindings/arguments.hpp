@@ -10,6 +10,7 @@
 #include <array>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <sigmaik/sigmaik.hpp>
@@ -133,6 +134,9 @@ class SIGMAIK_HIDDEN MethodClass {};
 bool load_method(py::handle object, Method& method);
 
 py::object method_to_python(const Method& method);
+
+/// "NAME(KEY=VALUE, …)" for __repr__; an empty key gives the value alone, and None is left out.
+std::string record(const char* name, std::initializer_list<std::pair<const char*, py::object>> values);
 
 /// Python's warnings, of the category sigmaik.ModelWarning, at the line that called us. Throws where the user made
 /// errors of them.

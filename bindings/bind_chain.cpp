@@ -164,8 +164,12 @@ void bind_parts(py::class_<Chain>& cls) {
       .def_property_readonly(
           "warnings", [](const Chain& c) -> Strings { return py::tuple(py::cast(c.warnings())); },
           "What is wrong with the model and does not keep the arm from moving, one sentence each.")
-      .def_property_readonly(
-          "missing_limits", [](const Chain& c) -> Strings { return py::tuple(py::cast(c.missing_limits())); },
+      .def(
+          "missing_limits",
+          [](const Chain& c, bool velocity, bool acceleration) -> Strings {
+            return py::tuple(py::cast(c.missing_limits(velocity, acceleration)));
+          },
+          py::kw_only(), py::arg("velocity") = true, py::arg("acceleration") = true,
           "Velocity and acceleration limits that joints lack, one sentence a kind: a servo cannot hold these.")
       .def(
           "with_limits",

@@ -76,16 +76,24 @@ void bind_constrained_ik(py::module_& m) {
       m, "ConstrainedIk",
       "Follows a target pose inside every joint limit: an exact part, and the rest as well as the\n"
       "limits allow (Schreiber, Otter and Hirzinger 1999).");
-  def_init<ConstrainedIkOptions>(
-      c, std::tuple{parameter<Chain>("chain")}, 1, "",
-      [](const Chain& chain, const ConstrainedIkOptions& options) { return ConstrainedIk(chain, options); });
+  def_init<ConstrainedIkOptions>(c, std::tuple{parameter<Chain>("chain")}, 1,
+                                 "Warns (ModelWarning) of velocity and acceleration limits that joints lack.",
+                                 [](const Chain& chain, const ConstrainedIkOptions& options) {
+                                   ConstrainedIk ik(chain, options);
+                                   warn(chain.missing_limits(options.velocity_limits, options.acceleration_limits));
+                                   return ik;
+                                 });
   c.def(
        "reset",
        [](ConstrainedIk& ik, const ArrayLike& q, const MaybeArray& qdot) {
          const int n = ik.chain().dof();
-         ik.reset(joint_argument(q, "q", n), optional_joint_argument(object_of(qdot), "qdot", n));
+         const JointVector start = joint_argument(q, "q", n);
+         ik.reset(start, optional_joint_argument(object_of(qdot), "qdot", n));
+         if (ik.options().position_limits) warn(ik.chain().far_outside_limits(start));
        },
-       py::arg("q"), py::arg("qdot") = py::none(), "Starts, or starts again, at q (n,), moving with qdot (n,).")
+       py::arg("q"), py::arg("qdot") = py::none(),
+       "Starts, or starts again, at q (n,), moving with qdot (n,).\n\n"
+       "Warns (ModelWarning) of a joint that starts more than 1 rad or 1 m outside its limits.")
       .def(
           "step",
           [](ConstrainedIk& ik, const py::object& target) {
@@ -117,7 +125,13 @@ void bind_constrained_ik(py::module_& m) {
             require_started(ik);
             return to_numpy(ik.reference().matrix());
           },
-          "(4, 4) the pose that the last step aimed at: its target, slowed down by ϑ.");
+          "(4, 4) the pose that the last step aimed at: its target, slowed down by ϑ.")
+      .def("__repr__", [](const ConstrainedIk& ik) {
+        return record("ConstrainedIk", {{"", py::cast(ik.chain())},
+                                        {"dt", py::cast(ik.options().dt)},
+                                        {"has_analytic", py::cast(ik.has_analytic())},
+                                        {"q", ik.q().size() != 0 ? py::object(to_numpy(ik.q())) : py::none()}});
+      });
 }
 
 }  // namespace sigmaik::bindings

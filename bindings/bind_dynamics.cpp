@@ -74,7 +74,8 @@ void bind_rigid_body(py::module_& m) {
           },
           py::arg("q"), py::arg("qdot"), py::arg("torque"),
           "q̈ = M⁻¹ (τ − C q̇ − g) (n,) [rad/s² or m/s²] at q, q̇ (n,) under τ (n,) [N·m].\n\n"
-          "Raises Error where M is not positive definite.");
+          "Raises Error where M is not positive definite.")
+      .def("__repr__", [](const Dynamics& d) { return record("Dynamics", {{"dof", py::cast(d.dof())}}); });
 }
 
 void bind_computed_torque(py::module_& m) {
@@ -114,7 +115,8 @@ void bind_computed_torque(py::module_& m) {
             return step;
           },
           py::arg("q"), py::arg("qdot"), py::arg("q_desired"), py::arg("qdot_desired"), py::arg("qddot_desired"),
-          "One cycle: the arm is at q, q̇ (n,), and should be at q_d, q̇_d, accelerating by q̈_d.");
+          "One cycle: the arm is at q, q̇ (n,), and should be at q_d, q̇_d, accelerating by q̈_d.")
+      .def("__repr__", [](const ComputedTorque& c) { return record("ComputedTorque", {{"dof", py::cast(c.dof())}}); });
 }
 
 }  // namespace

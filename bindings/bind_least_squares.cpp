@@ -86,7 +86,11 @@ void bind_least_squares(py::module_& m) {
           "active", [](const LeastSquaresSolution& s) { return indices(s.active); },
           "Indices of the rows of G that hold the answer, or are violated.")
       .def_readonly("violation", &LeastSquaresSolution::violation, "|max(0, G x − h)|")
-      .def_readonly("equality_error", &LeastSquaresSolution::equality_error, "|C x − d|");
+      .def_readonly("equality_error", &LeastSquaresSolution::equality_error, "|C x − d|")
+      .def("__repr__", [](const LeastSquaresSolution& s) {
+        return record("LeastSquaresSolution",
+                      {{"status", py::cast(std::string(to_string(s.status)))}, {"x", to_numpy(s.x)}});
+      });
 
   m.def(
       "least_squares",

@@ -58,20 +58,25 @@ void bind_servo(py::module_& m) {
       "Drives a chain's reference configuration towards poses, or along twists, one cycle a call.\n\n"
       "It integrates its own command (q ← q + q̇ dt) and reads no measured positions. Every command holds\n"
       "the chain's limits and leaves room to go on holding them; a start outside them comes back.");
-  def_init<ServoOptions>(c, std::tuple{parameter<Chain>("chain"), parameter<Method>("method")}, 1, "",
+  def_init<ServoOptions>(c, std::tuple{parameter<Chain>("chain"), parameter<Method>("method")}, 1,
+                         "Warns (ModelWarning) of velocity and acceleration limits that joints lack.",
                          [](const Chain& chain, const Method& method, const ServoOptions& options) {
-                           return Servo(chain, method, options);
+                           Servo servo(chain, method, options);
+                           warn(chain.missing_limits(options.velocity_limits, options.acceleration_limits));
+                           return servo;
                          });
   c.def(
        "reset",
        [](Servo& s, const ArrayLike& q, const MaybeArray& qdot) {
-         s.reset(joint_argument(q, "q", s.chain().dof()),
-                 optional_joint_argument(object_of(qdot), "qdot", s.chain().dof()));
+         const JointVector start = joint_argument(q, "q", s.chain().dof());
+         s.reset(start, optional_joint_argument(object_of(qdot), "qdot", s.chain().dof()));
+         if (s.options().position_limits) warn(s.chain().far_outside_limits(start));
        },
        py::arg("q"), py::arg("qdot") = py::none(),
        "Starts, or starts again, at q (n,): forgets all history, and pins the posture there unless one was "
        "given.\n\n"
-       "qdot: (n,) how the arm moves now, from which the command is faded; None: it stands.")
+       "qdot: (n,) how the arm moves now, from which the command is faded; None: it stands.\n"
+       "Warns (ModelWarning) of a joint that starts more than 1 rad or 1 m outside its limits.")
       .def(
           "update",
           [](Servo& s, const py::object& target, const MaybeArray& feedforward) {
@@ -115,7 +120,13 @@ void bind_servo(py::module_& m) {
             require_started(s);
             return to_numpy(s.tip().matrix());
           },
-          "(4, 4) tip in base at q.");
+          "(4, 4) tip in base at q.")
+      .def("__repr__", [](const Servo& s) {
+        return record("Servo", {{"", py::cast(s.chain())},
+                                {"", py::cast(s.method())},
+                                {"dt", py::cast(s.options().dt)},
+                                {"q", s.q().size() != 0 ? py::object(to_numpy(s.q())) : py::none()}});
+      });
 }
 
 }  // namespace sigmaik::bindings

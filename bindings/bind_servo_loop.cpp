@@ -128,7 +128,14 @@ void bind_servo_loop(py::module_& m) {
       .def_readonly("unread", &LoopStatistics::unread, "Samples lost, as nobody read them in time.")
       .def_readonly("worst_delay", &LoopStatistics::worst_delay, "[s] from when a cycle was due to its start.")
       .def_readonly("elapsed", &LoopStatistics::elapsed, "[s] since start(), or from start() to stop().")
-      .def_property_readonly("rate", &LoopStatistics::rate, "[Hz] cycles a second.");
+      .def_property_readonly("rate", &LoopStatistics::rate, "[Hz] cycles a second.")
+      .def("__repr__", [](const LoopStatistics& s) {
+        return record("LoopStatistics", {{"cycles", py::cast(s.cycles)},
+                                         {"missed", py::cast(s.missed)},
+                                         {"unread", py::cast(s.unread)},
+                                         {"worst_delay", py::cast(s.worst_delay)},
+                                         {"rate", py::cast(s.rate())}});
+      });
 
   py::class_<ServoLoop> c(
       m, "ServoLoop",
@@ -173,6 +180,12 @@ void bind_servo_loop(py::module_& m) {
            "singular and limiting_joints (bits), scale.")
       .def_property_readonly("statistics", &ServoLoop::statistics)
       .def_property_readonly("dt", &ServoLoop::dt, "[s]")
+      .def("__repr__",
+           [](const ServoLoop& loop) {
+             return record(
+                 "ServoLoop",
+                 {{"dof", py::cast(loop.dof())}, {"dt", py::cast(loop.dt())}, {"running", py::cast(loop.running())}});
+           })
       .def("__enter__",
            [](const py::object& self) {
              self.cast<ServoLoop&>().start();

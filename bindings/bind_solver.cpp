@@ -33,7 +33,12 @@ void bind_spectrum(py::module_& m) {
             return py::make_tuple(to_numpy(u), to_numpy(sigma), to_numpy(v));
           },
           py::arg("J"), "U (m, m), σ (min(m, n),) from large to small, V (n, min(m, n)) of J (m, n), m ≤ 6, n ≤ 16.")
-      .def_property_readonly("sweeps", &Spectrum::sweeps, "Sweeps of rotations that the last call took.");
+      .def_property_readonly("sweeps", &Spectrum::sweeps, "Sweeps of rotations that the last call took.")
+      .def("__repr__", [](const Spectrum& s) {
+        py::list sigma;
+        for (int i = 0; i < s.size(); ++i) sigma.append(s.sigma(i));
+        return record("Spectrum", {{"rows", py::cast(s.rows())}, {"cols", py::cast(s.cols())}, {"sigma", sigma}});
+      });
 }
 
 void bind_solution(py::module_& m) {
@@ -115,7 +120,10 @@ void bind_velocity_solver(py::module_& m) {
           "Raises Error where a shape is wrong or an entry is not finite.")
       .def("reset", &VelocitySolver::reset, "Forgets the warm start.")
       .def_property("method", &VelocitySolver::method, &VelocitySolver::set_method, "The rule; may be changed.")
-      .def_property_readonly("length_scale", &VelocitySolver::length_scale, "[m]");
+      .def_property_readonly("length_scale", &VelocitySolver::length_scale, "[m]")
+      .def("__repr__", [](const VelocitySolver& s) {
+        return record("VelocitySolver", {{"", py::cast(s.method())}, {"length_scale", py::cast(s.length_scale())}});
+      });
 }
 
 void bind_batch(py::module_& m) {

@@ -127,7 +127,11 @@ void bind_stream(py::module_& m) {
           "at", [](TargetStream& s, double time) { return s.at(time_argument(time)); }, py::arg("time"),
           "The target at a time [s] not before that of the last call; else the last one again.")
       .def_property_readonly("counts", &TargetStream::counts, py::return_value_policy::copy,
-                             "How many samples had which fate.");
+                             "How many samples had which fate.")
+      .def("__repr__", [](const TargetStream& s) {
+        return record("TargetStream",
+                      {{"mode", Argument<StreamMode>::to(s.options().mode)}, {"", py::cast(s.counts())}});
+      });
 }
 
 }  // namespace

@@ -191,25 +191,22 @@ Chain Chain::with_limits(const JointLimits& limits) const {
   return Chain(model_->base, std::move(segments));
 }
 
-std::vector<std::string> Chain::missing_limits() const {
-  const auto sentence = [this](const char* kind, const JointVector& values, const char* consequence) {
+std::vector<std::string> Chain::missing_limits(bool velocity, bool acceleration) const {
+  std::vector<std::string> sentences;
+  const auto look = [&](const char* kind, const JointVector& values, const char* consequence) {
     std::string joints;
     int missing = 0;
     for (int i = 0; i < dof(); ++i) {
       if (std::isfinite(values[i])) continue;
       joints += (missing++ > 0 ? ", '" : "'") + joint_names()[static_cast<std::size_t>(i)] + "'";
     }
-    if (missing == 0) return std::string();
+    if (missing == 0) return;
     if (missing == dof()) joints = "the joints";
-    return joints + (missing == 1 ? " has" : " have") + " no " + kind + " limit: " + consequence + ". with_limits(" +
-           kind + "=…) gives limits";
+    sentences.push_back(joints + (missing == 1 && dof() > 1 ? " has" : " have") + " no " + kind +
+                        " limit: " + consequence + "; Chain.with_limits(" + kind + "=…) gives limits");
   };
-  std::vector<std::string> sentences;
-  for (std::string text :
-       {sentence("velocity", limits().velocity, "nothing bounds how fast a command moves them"),
-        sentence("acceleration", limits().acceleration, "a command may change their velocity at once")}) {
-    if (!text.empty()) sentences.push_back(std::move(text));
-  }
+  if (velocity) look("velocity", limits().velocity, "nothing bounds how fast a command moves them");
+  if (acceleration) look("acceleration", limits().acceleration, "a command may change their velocity at once");
   return sentences;
 }
 

@@ -77,51 +77,6 @@ def test_names_fixed_by_the_design():
         assert step.limiting_joints == ()
 
 
-def test_the_readmes_python():
-    text = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
-    blocks = re.findall(r"```python\n(.*?)```", text, re.S)
-    assert blocks
-    chain = sk.robots.load("ufactory_xarm7")
-    sent = []
-
-    class TwoCycles:
-        def __init__(self):
-            self.left = 2
-
-        def __bool__(self):
-            self.left -= 1
-            return self.left >= 0
-
-    rng = np.random.default_rng(0)
-    for block in blocks:
-        batch = "solve_batch" in block
-        single, _, many = block.partition("qdot = sk.solve_batch")
-        names = {
-            "q": sk.robots.home("ufactory_xarm7"),
-            "target": chain.pose(sk.robots.home("ufactory_xarm7")),
-            "running": TwoCycles(),
-            "send": lambda *command: sent.append(command),
-            "J": rng.normal(size=(6, 7)),
-            "twist": rng.normal(size=6),
-            "start": sk.robots.home("franka_panda"),
-            "goal": sk.robots.home("franka_panda") + 0.3,
-            "servo": sk.Servo(chain, sk.JParse()),
-            "stamp": 0.0,
-            "now": 0.02,
-            "pose": chain.pose(sk.robots.home("ufactory_xarm7")),
-            "sk": sk,
-        }
-        names["servo"].reset(names["q"])
-        path = str(sk.robots.path("ufactory_xarm7"))
-        code = single.replace('"arm.urdf", base="base_link", tip="tool0"', f'{path!r}, tip="flange"')
-        exec(compile(code, "README.md", "exec"), names)
-        if batch:
-            names |= {"J": rng.normal(size=(5, 6, 7)), "twist": rng.normal(size=(5, 6))}
-            exec(compile("qdot = sk.solve_batch" + many, "README.md", "exec"), names)
-            assert names["qdot"].shape == (5, 7)
-    assert len(sent) == 2
-
-
 # Methods ----------
 
 

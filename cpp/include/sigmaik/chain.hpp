@@ -107,7 +107,8 @@ class Chain {
 
   /// What a servo of this arm cannot hold, one sentence a kind of limit: velocity and acceleration limits that joints
   /// lack. Python warns of them where a servo is made.
-  std::vector<std::string> missing_limits() const;
+  /// \param velocity, acceleration whether the kind matters
+  std::vector<std::string> missing_limits(bool velocity = true, bool acceleration = true) const;
 
   /// One sentence for each joint that is outside its position limits by more than 1 rad or 1 m at q (n,): a start there
   /// is rather a mistake of units than a posture. Python warns of them where a servo is reset.
