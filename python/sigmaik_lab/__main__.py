@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import os
 import sys
+import warnings
 from collections.abc import Sequence
 
 import sigmaik as sk
@@ -21,11 +22,15 @@ __all__ = ["main"]
 #: Other names of studies.
 _ALIASES = {"table": "round-table"}
 
+_python_shows = warnings.showwarning
+
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Runs the command. Returns the exit code: 0, 2 for wrong input, 130 when interrupted."""
     words = list(sys.argv[1:] if argv is None else argv)
     called = next((word for word in words if not word.startswith("-")), "")
+    warnings.showwarning = _show_warning
+    warnings.simplefilter("once", sk.ModelWarning)
     try:
         args = _parser(_ALIASES.get(called, called)).parse_args(words)
         result: int = args.call(args)
@@ -68,6 +73,14 @@ def _fill(parser: argparse.ArgumentParser, name: str) -> None:
         raise ValueError(f"the folder of '{name}' has neither study.py nor command.py")
     command.options(parser)
     parser.set_defaults(call=command.run)
+
+
+def _show_warning(message: Warning | str, category: type[Warning], *place: object) -> None:
+    """A warning of a model is for the user, not about a line of code."""
+    if issubclass(category, sk.ModelWarning):
+        print(f"sigmaik: warning: {message}", file=sys.stderr)
+    else:
+        _python_shows(message, category, *place)  # type: ignore[arg-type]
 
 
 def _one_line(error: Exception) -> str:
