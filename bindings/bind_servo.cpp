@@ -123,7 +123,7 @@ void bind_servo(py::module_& m) {
           "(4, 4) tip in base at q.")
       .def("__repr__", [](const Servo& s) {
         return record("Servo", {{"", py::cast(s.chain())},
-                                {"", py::cast(s.method())},
+                                {"", method_to_python(s.method())},
                                 {"dt", py::cast(s.options().dt)},
                                 {"q", s.q().size() != 0 ? py::object(to_numpy(s.q())) : py::none()}});
       });
