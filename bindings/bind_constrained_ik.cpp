@@ -80,7 +80,7 @@ void bind_constrained_ik(py::module_& m) {
                                  "Warns (ModelWarning) of velocity and acceleration limits that joints lack.",
                                  [](const Chain& chain, const ConstrainedIkOptions& options) {
                                    ConstrainedIk ik(chain, options);
-                                   warn(chain.missing_limits(options.velocity_limits, options.acceleration_limits));
+                                   warn(chain.missing_limits(options.limits.velocity, options.limits.acceleration));
                                    return ik;
                                  });
   c.def(
@@ -89,7 +89,7 @@ void bind_constrained_ik(py::module_& m) {
          const int n = ik.chain().dof();
          const JointVector start = joint_argument(q, "q", n);
          ik.reset(start, optional_joint_argument(object_of(qdot), "qdot", n));
-         if (ik.options().position_limits) warn(ik.chain().far_outside_limits(start));
+         if (ik.options().limits.position) warn(ik.chain().far_outside_limits(start));
        },
        py::arg("q"), py::arg("qdot") = py::none(),
        "Starts, or starts again, at q (n,), moving with qdot (n,).\n\n"

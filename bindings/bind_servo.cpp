@@ -62,7 +62,7 @@ void bind_servo(py::module_& m) {
                          "Warns (ModelWarning) of velocity and acceleration limits that joints lack.",
                          [](const Chain& chain, const Method& method, const ServoOptions& options) {
                            Servo servo(chain, method, options);
-                           warn(chain.missing_limits(options.velocity_limits, options.acceleration_limits));
+                           warn(chain.missing_limits(options.limits.velocity, options.limits.acceleration));
                            return servo;
                          });
   c.def(
@@ -70,7 +70,7 @@ void bind_servo(py::module_& m) {
        [](Servo& s, const ArrayLike& q, const MaybeArray& qdot) {
          const JointVector start = joint_argument(q, "q", s.chain().dof());
          s.reset(start, optional_joint_argument(object_of(qdot), "qdot", s.chain().dof()));
-         if (s.options().position_limits) warn(s.chain().far_outside_limits(start));
+         if (s.options().limits.position) warn(s.chain().far_outside_limits(start));
        },
        py::arg("q"), py::arg("qdot") = py::none(),
        "Starts, or starts again, at q (n,): forgets all history, and pins the posture there unless one was "

@@ -122,7 +122,8 @@ void bind_velocity_solver(py::module_& m) {
       .def_property("method", &VelocitySolver::method, &VelocitySolver::set_method, "The rule; may be changed.")
       .def_property_readonly("length_scale", &VelocitySolver::length_scale, "[m]")
       .def("__repr__", [](const VelocitySolver& s) {
-        return record("VelocitySolver", {{"", method_to_python(s.method())}, {"length_scale", py::cast(s.length_scale())}});
+        return record("VelocitySolver",
+                      {{"", method_to_python(s.method())}, {"length_scale", py::cast(s.length_scale())}});
       });
 }
 
