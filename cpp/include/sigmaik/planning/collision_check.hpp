@@ -16,7 +16,9 @@ class CollisionCheck {
  public:
   CollisionCheck(ArmSpheres spheres, DistanceField field) : spheres_(std::move(spheres)), field_(std::move(field)) {}
 
+  /// The arm.
   const ArmSpheres& spheres() const noexcept { return spheres_; }
+  /// The obstacles.
   const DistanceField& field() const noexcept { return field_; }
 
   /// The least signed distance [m] of the arm to the obstacles at `count` configurations q (count, n) in C order.

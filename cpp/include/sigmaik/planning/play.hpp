@@ -22,6 +22,7 @@ struct Playback {
   std::vector<double> pose_error;
   std::vector<Status> status;  ///< M − 1, one for each cycle
 
+  /// Number of samples.
   std::size_t size() const noexcept { return t.size(); }
   /// [m] the tip's largest distance from its plan.
   double max_position_error() const noexcept;

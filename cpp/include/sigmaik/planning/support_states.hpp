@@ -103,6 +103,7 @@ class SupportPlanner {
   /// \throws Error as stochastic(), or where start or goal touches an obstacle
   Trajectory plan(const JointVector& start, const JointVector& goal, const StochasticOptions& options);
 
+  /// Number of support states.
   int states() const noexcept;
   /// The arm.
   const Chain& chain() const noexcept;

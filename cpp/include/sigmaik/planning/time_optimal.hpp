@@ -105,6 +105,7 @@ class TimeOptimal {
   /// the plan failed.
   double along(const Trajectory& trajectory) const;
 
+  /// The arm.
   const Chain& chain() const noexcept { return chain_; }
   /// L, or null for none.
   const JointCostPtr& cost() const noexcept { return cost_; }

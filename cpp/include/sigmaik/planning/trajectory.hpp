@@ -42,14 +42,15 @@ struct Trajectory {
   /// (N, n) [rad/s² or m/s²] of the step that begins at the sample, zero in the last row; where `cubic`, at the sample
   std::vector<double> qddot;
   double duration = std::numeric_limits<double>::quiet_NaN();  ///< [s] NaN where failed; see the planner what it counts
-  PlanStatus status = PlanStatus::Failed;
-  double cost = std::numeric_limits<double>::quiet_NaN();  ///< the planner's objective; NaN where failed
-  double solve_time = 0.0;                                 ///< [s] of wall-clock time, of the optimiser alone
-  int iterations = 0;                                      ///< steps of the optimiser, of all starts
-  int starts = 1;                                          ///< first guesses tried
+  PlanStatus status = PlanStatus::Failed;                      ///< what the planner did
+  double cost = std::numeric_limits<double>::quiet_NaN();      ///< the planner's objective; NaN where failed
+  double solve_time = 0.0;                                     ///< [s] of wall-clock time, of the optimiser alone
+  int iterations = 0;                                          ///< steps of the optimiser, of all starts
+  int starts = 1;                                              ///< first guesses tried
   bool cubic = false;  ///< positions are cubic between samples, as under a Gaussian-process prior; else quadratic
   std::optional<Clearance> clearance;  ///< from singularities, between the samples too; none where failed
 
+  /// Number N of samples.
   std::size_t size() const noexcept { return t.size(); }
 
   /// At times (M,) [s]; before the first and after the last sample the motion is held there.
