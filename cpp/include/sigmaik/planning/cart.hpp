@@ -90,16 +90,18 @@ struct CartRegion {
 
 /// A law of the cart, and what it had to keep out of.
 struct CartLaw {
-  std::vector<double> x;             ///< (M,) [m] at the samples
-  std::vector<double> lower, upper;  ///< (M,) [m] λ∓ for radius + margin; +∞ and −∞ where nothing is forbidden
-  std::vector<double> multipliers;   ///< (M,) [m] μ: positive where the law is held up, negative where it is held down
-  std::vector<CartRegion> regions;
+  std::vector<double> x;            ///< (M,) [m] at the samples
+  std::vector<double> lower;        ///< (M,) [m] λ− for radius + margin; +∞ where nothing is forbidden
+  std::vector<double> upper;        ///< (M,) [m] λ+ for radius + margin; −∞ where nothing is forbidden
+  std::vector<double> multipliers;  ///< (M,) [m] μ: positive where the law is held up, negative where it is held down
+  std::vector<CartRegion> regions;  ///< parts of the forbidden region, in the order of time
   /// The string's corners: where [samples], and at which position [m]; straight between them. A corner at the tip of a
   /// region can lie between samples.
-  std::vector<double> corners, corner_x;
-  double energy = 0.0;  ///< [m²] Σ (Δx)²; where a corner lies between samples Σ (Δx)²/Δi, the string's own
-  double turn = 0.0;    ///< [rad] of P's azimuth
-  int strings = 0;      ///< taut strings drawn
+  std::vector<double> corners;
+  std::vector<double> corner_x;  ///< the positions of the corners [m]
+  double energy = 0.0;           ///< [m²] Σ (Δx)²; where a corner lies between samples Σ (Δx)²/Δi, the string's own
+  double turn = 0.0;             ///< [rad] of P's azimuth
+  int strings = 0;               ///< taut strings drawn
 };
 
 /// λ∓ (6) of every sample [m]; +∞ and −∞, the empty interval, where |y| ≥ radius.

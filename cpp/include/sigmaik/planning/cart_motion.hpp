@@ -25,6 +25,7 @@ struct CartMeasures {
   int inside = 0;           ///< samples within the radius
   double turn = 0.0;        ///< [rad] by which the point's azimuth turns, seen from the axis
 
+  /// Number M of samples.
   int samples() const noexcept { return static_cast<int>(flange_xy.size() / 2); }
   /// (M,) [s] of the samples.
   std::vector<double> t() const;
@@ -35,15 +36,16 @@ struct CartMeasures {
 /// Of a cart with one axis: straight between samples, but where `corners` has one between two of them, at the tip of a
 /// forbidden region.
 struct CartMotion : CartMeasures {
-  std::vector<double> x;             ///< (M,) [m] of the cart
-  std::vector<double> lower, upper;  ///< (M,) [m] λ∓ at radius + margin; +∞ and −∞ where the cart is free
-  std::vector<std::int8_t> sides;    ///< (M,) 1 above a forbidden interval, −1 below, 0 where there is none, or inside
-  std::vector<CartRegion> regions;   ///< of an exact law
-  std::vector<double> corners;       ///< (K,) [samples] where the law bends, and its ends
-  std::vector<double> corner_x;      ///< (K,) [m] there
-  std::vector<double> multipliers;   ///< (M,) [m] of an exact law, see CartLaw; else empty
-  std::string method = "given";      ///< "exact", "gradient", or "given" for a law that was only looked at
-  int iterations = 0;                ///< steps of the gradient descent, or taut strings drawn
+  std::vector<double> x;            ///< (M,) [m] of the cart
+  std::vector<double> lower;        ///< (M,) [m] λ− at radius + margin; +∞ where the cart is free
+  std::vector<double> upper;        ///< (M,) [m] λ+ at radius + margin; −∞ where the cart is free
+  std::vector<std::int8_t> sides;   ///< (M,) 1 above a forbidden interval, −1 below, 0 where there is none, or inside
+  std::vector<CartRegion> regions;  ///< of an exact law
+  std::vector<double> corners;      ///< (K,) [samples] where the law bends, and its ends
+  std::vector<double> corner_x;     ///< (K,) [m] there
+  std::vector<double> multipliers;  ///< (M,) [m] of an exact law, see CartLaw; else empty
+  std::string method = "given";     ///< "exact", "gradient", or "given" for a law that was only looked at
+  int iterations = 0;               ///< steps of the gradient descent, or taut strings drawn
 
   double max_speed() const noexcept;         ///< [m/s]
   double max_acceleration() const noexcept;  ///< [m/s²], the largest second difference over the samples

@@ -23,6 +23,7 @@ namespace sigmaik::planning {
 
 /// A number for each axis of the cart.
 using AxisPair = std::array<double, 2>;
+/// No limit.
 inline constexpr double kUnlimited = std::numeric_limits<double>::infinity();
 
 /// What a motion in the plane must keep to.

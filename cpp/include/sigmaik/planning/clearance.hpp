@@ -24,6 +24,7 @@ struct Crossing {
   double psi = 0.0;       ///< ψ there: 0 on the set
   bool avoidable = true;  ///< a path from start to goal can do without this crossing
 
+  /// Whether all members are equal.
   bool operator==(const Crossing&) const = default;
 };
 

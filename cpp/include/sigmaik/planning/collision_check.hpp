@@ -14,6 +14,7 @@ namespace sigmaik::planning {
 /// An arm among obstacles. A value, safe to use from many threads.
 class CollisionCheck {
  public:
+  /// Keeps the arm and the obstacles.
   CollisionCheck(ArmSpheres spheres, DistanceField field) : spheres_(std::move(spheres)), field_(std::move(field)) {}
 
   /// The arm.

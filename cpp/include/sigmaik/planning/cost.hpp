@@ -42,6 +42,7 @@ class Cost {
     if (cost) parts_.push_back({1.0, [cost = BatchCostPtr(std::move(cost))](const Chain&) { return cost; }});
   }
 
+  /// Whether nothing costs anything.
   bool empty() const noexcept { return parts_.empty(); }
 
   /// The sum for one arm: a JointCost where every term is one, null where there are none.
@@ -51,6 +52,7 @@ class Cost {
   /// \throws Error also where a term is no JointCost
   JointCostPtr bind_smooth(const Chain& chain) const;
 
+  /// Adds the parts of another cost.
   Cost& operator+=(const Cost& other);
   /// \throws Error where the factor is not finite or negative
   Cost& operator*=(double factor);
@@ -66,9 +68,11 @@ class Cost {
   std::vector<Part> parts_;
 };
 
+/// The sum of two costs.
 inline Cost operator+(Cost a, const Cost& b) { return a += b; }
 /// \throws Error where the factor is not finite or negative
 inline Cost operator*(double factor, Cost cost) { return cost *= factor; }
+/// The cost times a factor.
 inline Cost operator*(Cost cost, double factor) { return cost *= factor; }
 
 /// The library's terms.

@@ -18,6 +18,7 @@ namespace sigmaik::planning {
 
 /// Obstacles that a motion keeps clear of: a cost where the arm is near to them, and a check of the answer.
 struct KeepClear {
+  /// The obstacles.
   DistanceField field;
   std::optional<ArmSpheres> spheres = std::nullopt;  ///< none: ArmSpheres::along_links(chain)
   double margin = 0.05;                              ///< [m] > 0: obstacles that are farther cost nothing

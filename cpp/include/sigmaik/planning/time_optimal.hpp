@@ -111,6 +111,7 @@ class TimeOptimal {
   const JointCostPtr& cost() const noexcept { return cost_; }
   /// The settings, as given.
   const TimeOptimalOptions& options() const noexcept { return options_; }
+  /// The known singular sets of the arm, where there are any.
   const std::optional<SingularSets>& sets() const noexcept { return sets_; }
 
   /// One start of the method, for one width of vectors.

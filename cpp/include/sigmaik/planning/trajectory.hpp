@@ -29,7 +29,9 @@ PlanStatus plan_status(const std::string& text);
 
 /// Positions, velocities and accelerations, (M, n) in C order.
 struct JointSamples {
-  std::vector<double> q, qdot, qddot;
+  std::vector<double> q;      ///< positions [rad or m]
+  std::vector<double> qdot;   ///< velocities [rad/s or m/s]
+  std::vector<double> qddot;  ///< accelerations [rad/s² or m/s²]
 };
 
 /// Joint positions over time, N samples of n joints. Between samples the acceleration is constant, or, where `cubic`,

@@ -14,6 +14,7 @@ namespace sigmaik::planning::costs {
 /// threads.
 double cached_reference_scale(const Chain& chain);
 
+/// The geometry-aware index as a cost.
 struct GeometryAware {
   double weight = 1.0;                     ///< > 0
   std::optional<double> k = std::nullopt;  ///< > 0; none: reference_scale(chain)

@@ -8,6 +8,7 @@
 
 namespace sigmaik::planning::costs {
 
+/// Potentials around the known singular sets as a cost.
 struct Potential {
   double weight = 1e2;                              ///< > 0
   double eta1 = sigmaik::Potential{}.eta1;          ///< log of the height
