@@ -38,10 +38,15 @@ void require_started(const ConstrainedIk& ik) {
   if (ik.q().size() == 0) throw Error("there is no start: call reset(q) first");
 }
 
+ConstrainedIkStep update(ConstrainedIk& ik, const py::object& target) {
+  require_started(ik);
+  return ik.update(pose_argument(target, "target"));
+}
+
 }  // namespace
 
 void bind_constrained_ik(py::module_& m) {
-  py::class_<ConstrainedIkStep>(m, "ConstrainedIkStep", "Answer of one step of a ConstrainedIk.")
+  py::class_<ConstrainedIkStep>(m, "ConstrainedIkStep", "Answer of one cycle of a ConstrainedIk.")
       .def_property_readonly(
           "q", [](const ConstrainedIkStep& s) { return to_numpy(s.q); }, "(n,) position command [rad or m]")
       .def_property_readonly(
@@ -83,6 +88,7 @@ void bind_constrained_ik(py::module_& m) {
                                    warn(chain.missing_limits(options.limits.velocity, options.limits.acceleration));
                                    return ik;
                                  });
+  def_options(c);
   c.def(
        "reset",
        [](ConstrainedIk& ik, const ArrayLike& q, const MaybeArray& qdot) {
@@ -94,13 +100,9 @@ void bind_constrained_ik(py::module_& m) {
        py::arg("q"), py::arg("qdot") = py::none(),
        "Starts, or starts again, at q (n,), moving with qdot (n,).\n\n"
        "Warns (ModelWarning) of a joint that starts more than 1 rad or 1 m outside its limits.")
-      .def(
-          "step",
-          [](ConstrainedIk& ik, const py::object& target) {
-            require_started(ik);
-            return ik.step(pose_argument(target, "target"));
-          },
-          py::arg("target"), "One cycle towards a pose (4, 4) of the tip in the base. Raises Error where it is none.")
+      .def("update", &update, py::arg("target"),
+           "One cycle towards a pose (4, 4) of the tip in the base. Raises Error where the target is no pose.")
+      .def("step", &update, py::arg("target"), "The same as update().")
       .def_property_readonly("chain", &ConstrainedIk::chain)
       .def_property_readonly(
           "dt", [](const ConstrainedIk& ik) { return ik.options().dt; }, "[s]")

@@ -102,6 +102,7 @@ void bind_computed_torque(py::module_& m) {
       c, std::tuple{parameter<Chain>("chain")}, 0,
       "Raises Error where an option is out of its range, and where Dynamics does.",
       [](const Chain& chain, const ComputedTorqueOptions& options) { return ComputedTorque(chain, options); });
+  def_options(c);
   c.def_property_readonly("dof", &ComputedTorque::dof, "Number of movable joints, n.")
       .def(
           "update",

@@ -48,6 +48,12 @@ void bind_servo(py::module_& m) {
             return out;
           },
           "(m',) truth values, one a row of the task: the rule does not treat direction i as regular.")
+      .def_property_readonly(
+          "singular_directions", [](const ServoStep& s) { return to_numpy(s.singular_directions); },
+          "(6, k) a column for each direction that is singular to the rule, in the order of `singular`.\n\n"
+          "The twist [v; ω], base axes, at the tip's origin, that has u_i in the rows of the task and zero in the "
+          "rows\n"
+          "that the mask leaves out: |v|² + (length_scale |ω|)² = 1. The sign means nothing. None while holding.")
       .def("__repr__", [](const ServoStep& s) {
         return std::string("ServoStep(status=") + to_string(s.status) +
                ", qdot=" + py::str(to_numpy(s.qdot)).cast<std::string>() + ")";
@@ -65,6 +71,7 @@ void bind_servo(py::module_& m) {
                            warn(chain.missing_limits(options.limits.velocity, options.limits.acceleration));
                            return servo;
                          });
+  def_options(c);
   c.def(
        "reset",
        [](Servo& s, const ArrayLike& q, const MaybeArray& qdot) {

@@ -38,6 +38,13 @@ class Record {
       for (Eigen::Index j = 0; j < values.cols(); ++j) put(static_cast<double>(values(i, j)));
     }
   }
+  // Six columns; NaN where there are fewer.
+  void put_columns(const TwistColumns& values) {
+    for (Eigen::Index i = 0; i < 6; ++i) {
+      for (Eigen::Index j = 0; j < 6; ++j)
+        put(j < values.cols() ? values(i, j) : std::numeric_limits<double>::quiet_NaN());
+    }
+  }
   // NaN where there are fewer.
   void put_some(const TaskVector& values, int count) {
     for (int i = 0; i < count; ++i) put(i < values.size() ? values[i] : std::numeric_limits<double>::quiet_NaN());
@@ -66,6 +73,7 @@ py::dtype sample_dtype(int dof) {
   add_array("achieved_twist", py::make_tuple(6));
   add_array("singular_values", py::make_tuple(std::min(6, dof)));
   add("singular", "u1");
+  add_array("singular_directions", py::make_tuple(6, 6));
   add("limiting_joints", "<u2");
   add("scale", "<f8");
   return py::dtype::from_args(fields);
@@ -88,6 +96,7 @@ void write(const LoopSample& s, int dof, char* at) {
   record.put_all(s.step.achieved_twist);
   record.put_some(s.step.singular_values, std::min(6, dof));
   record.put(s.step.singular);
+  record.put_columns(s.step.singular_directions);
   record.put(s.step.limiting_joints);
   record.put(s.step.scale);
 }
@@ -177,7 +186,9 @@ void bind_servo_loop(py::module_& m) {
            "qdot (n,), target and\n"
            "pose (4, 4) of the tip, pose_error, asked_twist and achieved_twist (6,), singular_values (NaN while "
            "holding),\n"
-           "singular and limiting_joints (bits), scale.")
+           "singular (bits), singular_directions (6, 6) (ServoStep's columns, NaN beyond them), limiting_joints "
+           "(bits),\n"
+           "scale.")
       .def_property_readonly("statistics", &ServoLoop::statistics)
       .def_property_readonly("dt", &ServoLoop::dt, "[s]")
       .def("__repr__",

@@ -103,6 +103,7 @@ void bind_stream(py::module_& m) {
       "when the target is found elsewhere.");
   def_init<TargetStreamOptions>(c, std::tuple{}, 1, "",
                                 [](const TargetStreamOptions& options) { return TargetStream(options); });
+  def_options(c);
   c.def(
        "reset",
        [](TargetStream& s, const py::object& start) {

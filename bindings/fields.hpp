@@ -342,10 +342,12 @@ void add_options(std::vector<Slot>& slots) {
   });
 }
 
+using Keywords = py::typing::Dict<py::str, py::object>;
+
 /// The keywords and values of a struct: `**` of them makes the same struct again.
 template <typename Options>
-py::dict to_dict(const Options& options) {
-  py::dict out;
+Keywords to_dict(const Options& options) {
+  Keywords out;
   for_each_field(
       options, [&]<typename T>(const char* name, const T& value, const char*) { out[name] = Argument<T>::to(value); });
   return out;
@@ -406,6 +408,14 @@ void def_init(py::class_<Class, Extra...>& c, const std::tuple<Parameter<Leading
           return call_with<Options, Leading...>(s, args, kwargs, make);
         }),
         s.docstring("__init__", Argument<Class>::type(), "None", doc).c_str());
+}
+
+/// The property `options` of `c`: what its constructor was given, by keyword.
+template <typename Class, typename... Extra>
+void def_options(py::class_<Class, Extra...>& c) {
+  c.def_property_readonly(
+      "options", [](const Class& self) { return to_dict(self.options()); },
+      "The options by keyword: with ** of them the constructor makes the same again.");
 }
 
 /// A method of `c`: call(self, leading…, options).

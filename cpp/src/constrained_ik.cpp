@@ -15,10 +15,10 @@ namespace {
 using detail::require;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kMet = 1e-9;    // [m, rad] an error this small is none
-constexpr double kAgree = 0.01;  // of the width of a joint's bounds: velocities this close are the same
+constexpr double kMet = 1e-9;    // [m, rad] a smaller error counts as none
+constexpr double kAgree = 0.01;  // velocities that differ by less than this part of a joint's bounds are the same
 
-// The rows of the task that are in `part`, or that are not.
+// The rows of the task that are met exactly, or the others.
 Task part(const ConstrainedIkOptions& options, bool exact) {
   Task out = options.task;
   for (std::size_t i = 0; i < 6; ++i) out.mask[i] = options.task.mask[i] && options.exact[i] == exact;
@@ -35,8 +35,9 @@ Eigen::Matrix3d inverse_left_jacobian(const Eigen::Vector3d& phi) noexcept {
   return Eigen::Matrix3d::Identity() - 0.5 * cross + c * cross * cross;
 }
 
-// Whether the closed form asks for what was optimised. Where it does not, β still lets an error decay, which the closed
-// form would make up for in one cycle: as much acceleration as the limits allow, and back to the optimisation to brake.
+// Whether the closed form asks for the velocity that was optimised. Where the two differ, an error still decays by β.
+// The closed form would make up for that error in one cycle, with all the acceleration that the limits allow, and the
+// next cycle would have to optimise again, to brake.
 bool agrees(const AnalyticIk& analytic, const Pose& target, const LimitTracker& tracker,
             const JointVector& qdot) noexcept {
   const AnalyticNearest nearest = analytic.nearest(target, tracker.q());
@@ -98,7 +99,7 @@ void ConstrainedIk::reset(const JointRef& q, const JointRef& qdot) {
   last_free_ = true;
 }
 
-ConstrainedIkStep ConstrainedIk::step(const Pose& target) noexcept {
+ConstrainedIkStep ConstrainedIk::update(const Pose& target) noexcept {
   ConstrainedIkStep step;
   if (tracker_.q().size() == 0) {
     step.q = step.qdot = JointVector::Zero(chain_.dof());
@@ -135,7 +136,8 @@ ConstrainedIkStep ConstrainedIk::step(const Pose& target) noexcept {
   return step;
 }
 
-// (35): the closed form, where it is inside the limits; and back to it only from inside them, where it agrees.
+// (35): the closed form, where its answer is inside the limits. After an optimised step, the closed form is used again
+// only where that step met no limit and the two agreed.
 bool ConstrainedIk::try_analytic(const Pose& target, ConstrainedIkStep& step) noexcept {
   if (!analytic_ || !last_free_ || dynamics_) return false;
   const JointVector& from = tracker_.q();
@@ -143,8 +145,7 @@ bool ConstrainedIk::try_analytic(const Pose& target, ConstrainedIkStep& step) no
   if (nearest.status != AnalyticStatus::Ok || !nearest.branch.within_limits) return false;
   step.qdot = (nearest.branch.q - from) / options_.dt;
   const VelocityBounds& bounds = tracker_.bounds();
-  if ((step.qdot.array() > bounds.upper.array()).any() || (step.qdot.array() < bounds.lower.array()).any())
-    return false;
+  if (!bounds.contain(step.qdot)) return false;
   step.used = IkSource::Analytic;
   return true;
 }
@@ -167,8 +168,8 @@ void ConstrainedIk::prepare_torques() noexcept {
   }
 }
 
-void ConstrainedIk::optimise(const Pose& target, const Twist& motion, ConstrainedIkStep& step) noexcept {
-  step.used = IkSource::Optimised;
+// Sizes, bounds and all rows of the problem that the linearisations have in common.
+void ConstrainedIk::prepare() noexcept {
   const int n = chain_.dof(), ap = approximate_.rows(), ex = exact_.rows();
   const bool scaled = options_.gamma.has_value();
   const int unknowns = n + (scaled ? 1 : 0);
@@ -189,74 +190,104 @@ void ConstrainedIk::optimise(const Pose& target, const Twist& motion, Constraine
     p.A(2 * ap, n) = *options_.gamma;
   }
   if (dynamics_) prepare_torques();
+}
 
+// (11), (12): e ≈ slope Δq + offset, the tip minus the target; and e* = e + turned ϑ.
+struct ConstrainedIk::Linearisation {
+  Jacobian slope;
+  Twist offset, turned;
+
+  // At the tip `state` of joint positions from which it is `back` to where the step starts.
+  Linearisation(const ChainState& state, const Pose& target, const Twist& motion, const JointVector& back) noexcept
+      : slope(state.jacobian), offset(-pose_error(state.tip, target)), turned(motion) {
+    const Eigen::Matrix3d turn = inverse_left_jacobian(offset.tail<3>());
+    slope.bottomRows<3>() = turn.lazyProduct(state.jacobian.bottomRows<3>());
+    turned.tail<3>() = turn * motion.tail<3>();
+    for (Eigen::Index j = 0; j < back.size(); ++j) offset += back[j] * slope.col(j);
+  }
+};
+
+// (24), (25) with the weights α and β, and |e| ≤ max_error.
+void ConstrainedIk::set_approximate_rows(const Linearisation& at, const Twist& motion) noexcept {
+  const int n = chain_.dof(), ap = approximate_.rows();
+  if (ap == 0) return;
+  const bool scaled = options_.gamma.has_value();
+  const Eigen::Matrix3d& rotation = state_.tip.linear();
+  const TaskJacobian rows = select_rows(approximate_, rotation, at.slope);
+  const TaskJacobian rate = select_rows(approximate_, rotation, state_.jacobian);
+  const TaskVector offset = select_rows(approximate_, rotation, at.offset);
+  const TaskVector slowed = select_rows(approximate_, rotation, at.turned);
+  const TaskVector asked = select_rows(approximate_, rotation, motion);
+  auto& p = problem_;
+  int k = 0, bound = torque_rows_;
+  for (std::size_t i = 0; i < 6; ++i) {
+    if (!approximate_.mask[i]) continue;
+    const auto row = static_cast<Eigen::Index>(i);
+    const double alpha = options_.alpha[row], beta = options_.beta[row], most = options_.max_error[row];
+    p.A.row(k).head(n) = alpha * rows.row(k);
+    p.b[k] = -alpha * offset[k];
+    p.A.row(ap + k).head(n) = beta * rate.row(k);
+    p.b[ap + k] = beta * asked[k];
+    if (scaled) p.A(k, n) = alpha * slowed[k];
+    if (most < kInfinity) {
+      for (const double sign : {1.0, -1.0}) {
+        p.G.row(bound).head(n) = sign / most * rows.row(k);
+        if (scaled) p.G(bound, n) = sign / most * slowed[k];
+        p.h[bound++] = 1.0 - sign / most * offset[k];
+      }
+    }
+    ++k;
+  }
+}
+
+// (26): e* = 0.
+void ConstrainedIk::set_exact_rows(const Linearisation& at) noexcept {
+  if (exact_.rows() == 0) return;
+  const int n = chain_.dof();
+  const Eigen::Matrix3d& rotation = state_.tip.linear();
+  problem_.C.leftCols(n) = select_rows(exact_, rotation, at.slope);
+  problem_.d = -select_rows(exact_, rotation, at.offset);
+  if (options_.gamma) problem_.C.col(n) = select_rows(exact_, rotation, at.turned);
+}
+
+void ConstrainedIk::optimise(const Pose& target, const Twist& motion, ConstrainedIkStep& step) noexcept {
+  step.used = IkSource::Optimised;
+  prepare();
+  const int n = chain_.dof();
   const JointVector& from = tracker_.q();
   JointVector q = from;
-  ChainState& state = state_;
   LeastSquaresSolution solution;
   bool error_lost = false;
   for (int iteration = 0; iteration < options_.iterations; ++iteration) {
-    if (iteration > 0) sigmaik::update(chain_, q, state);
-    // (11), (12): e ≈ slope Δq + offset, of the tip minus the target; and e* = e + turned ϑ.
-    const Eigen::Matrix3d& rotation = state.tip.linear();
-    const Twist error = -pose_error(state.tip, target);
-    const Eigen::Matrix3d turn = inverse_left_jacobian(error.tail<3>());
-    Jacobian slope = state.jacobian;
-    slope.bottomRows<3>() = turn.lazyProduct(state.jacobian.bottomRows<3>());
-    Twist turned = motion;
-    turned.tail<3>() = turn * motion.tail<3>();
-    Twist offset = error;
-    for (int j = 0; j < n; ++j) offset += (from[j] - q[j]) * slope.col(j);
-
-    if (ap > 0) {
-      const TaskJacobian rows = select_rows(approximate_, rotation, slope);
-      const TaskJacobian rate = select_rows(approximate_, rotation, state.jacobian);
-      const TaskVector at = select_rows(approximate_, rotation, offset);
-      const TaskVector slowed = select_rows(approximate_, rotation, turned);
-      const TaskVector asked = select_rows(approximate_, rotation, motion);
-      int k = 0, bound = torque_rows_;
-      for (std::size_t i = 0; i < 6; ++i) {
-        if (!approximate_.mask[i]) continue;
-        const auto row = static_cast<Eigen::Index>(i);
-        const double alpha = options_.alpha[row], beta = options_.beta[row], most = options_.max_error[row];
-        p.A.row(k).head(n) = alpha * rows.row(k);
-        p.b[k] = -alpha * at[k];
-        p.A.row(ap + k).head(n) = beta * rate.row(k);
-        p.b[ap + k] = beta * asked[k];
-        if (scaled) p.A(k, n) = alpha * slowed[k];
-        if (most < kInfinity) {
-          for (const double sign : {1.0, -1.0}) {
-            p.G.row(bound).head(n) = sign / most * rows.row(k);
-            if (scaled) p.G(bound, n) = sign / most * slowed[k];
-            p.h[bound++] = 1.0 - sign / most * at[k];
-          }
-        }
-        ++k;
-      }
-    }
-    if (ex > 0) {
-      p.C.leftCols(n) = select_rows(exact_, rotation, slope);
-      p.d = -select_rows(exact_, rotation, offset);
-      if (scaled) p.C.col(n) = select_rows(exact_, rotation, turned);
-    }
-    solution = least_squares_.solve(p);
+    if (iteration > 0) sigmaik::update(chain_, q, state_);
+    const Linearisation at(state_, target, motion, from - q);
+    set_approximate_rows(at, motion);
+    set_exact_rows(at);
+    solution = least_squares_.solve(problem_);
     error_lost = error_rows_ > 0 && solution.equality_error > kMet;
     if (error_lost) {  // the exact part comes first
-      p.h.tail(error_rows_).setConstant(kInfinity);
-      solution = least_squares_.solve(p);
+      problem_.h.tail(error_rows_).setConstant(kInfinity);
+      solution = least_squares_.solve(problem_);
     }
     q = from + solution.x.head(n);
   }
+  report(solution, error_lost, step);
+}
+
+// What the last solution says of the step.
+void ConstrainedIk::report(const LeastSquaresSolution& solution, bool error_lost,
+                           ConstrainedIkStep& step) const noexcept {
   if (solution.status == LeastSquaresStatus::BadInput) {
     step.qdot = tracker_.stop();
     step.exact_met = false;
     return;
   }
+  const int n = chain_.dof();
   step.qdot = solution.x.head(n) / options_.dt;
-  if (scaled) step.time_scale = solution.x[n];
+  if (options_.gamma) step.time_scale = solution.x[n];
   const std::uint32_t held = solution.at_lower | solution.at_upper;
   step.active = static_cast<std::uint16_t>(held & ((1u << n) - 1u));
-  for (int k = 0; k < p.G.rows(); ++k) {
+  for (int k = 0; k < problem_.G.rows(); ++k) {
     if (solution.active >> k & 1u) (k < torque_rows_ ? step.torque_active : step.error_active) = true;
   }
   step.error_active = step.error_active || error_lost;

@@ -40,4 +40,19 @@ TaskVector select_rows(const Task& task, const Eigen::Matrix3d& rotation, const 
   return out;
 }
 
+Twist expand_rows(const Task& task, const Eigen::Matrix3d& rotation, const TaskVector& values) noexcept {
+  Twist out = Twist::Zero();
+  int row = 0;
+  for (int i = 0; i < 6; ++i) {
+    if (!task.mask[static_cast<std::size_t>(i)]) continue;
+    if (task.frame == Frame::Base) {
+      out[i] = values[row++];
+    } else {
+      const int block = i < 3 ? 0 : 3;
+      out.segment<3>(block) += values[row++] * rotation.col(i - block);
+    }
+  }
+  return out;
+}
+
 }  // namespace sigmaik

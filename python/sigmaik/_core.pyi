@@ -619,6 +619,14 @@ class ServoStep:
         (m',) truth values, one a row of the task: the rule does not treat direction i as regular.
         """
     @property
+    def singular_directions(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (6, k) a column for each direction that is singular to the rule, in the order of `singular`.
+
+        The twist [v; ω], base axes, at the tip's origin, that has u_i in the rows of the task and zero in the rows
+        that the mask leaves out: |v|² + (length_scale |ω|)² = 1. The sign means nothing. None while holding.
+        """
+    @property
     def singular_values(self) -> numpy.typing.NDArray[numpy.float64]:
         """
         Singular values of the weighted task Jacobian, from large to small.
@@ -715,6 +723,11 @@ class Servo:
     def method(self, arg1: Method | str) -> None:
         ...
     @property
+    def options(self) -> dict[str, typing.Any]:
+        """
+        The options by keyword: with ** of them the constructor makes the same again.
+        """
+    @property
     def pose(self) -> numpy.typing.NDArray[numpy.float64]:
         """
         (4, 4) tip in base at q.
@@ -807,7 +820,8 @@ class ServoLoop:
 
         cycle, time [s] since start(), command (LoopCommand), configuration, restarted, status (Status), q and qdot (n,), target and
         pose (4, 4) of the tip, pose_error, asked_twist and achieved_twist (6,), singular_values (NaN while holding),
-        singular and limiting_joints (bits), scale.
+        singular (bits), singular_directions (6, 6) (ServoStep's columns, NaN beyond them), limiting_joints (bits),
+        scale.
         """
     def start(self) -> None:
         """
@@ -942,6 +956,11 @@ class TargetStream:
         """
         How many samples had which fate.
         """
+    @property
+    def options(self) -> dict[str, typing.Any]:
+        """
+        The options by keyword: with ** of them the constructor makes the same again.
+        """
 class Dynamics:
     """
     Rigid-body dynamics M(q) q̈ + C(q, q̇) q̇ + g(q) = τ of a chain with what it carries, by KDL.
@@ -1032,6 +1051,11 @@ class ComputedTorque:
         """
         Number of movable joints, n.
         """
+    @property
+    def options(self) -> dict[str, typing.Any]:
+        """
+        The options by keyword: with ** of them the constructor makes the same again.
+        """
 class LeastSquaresSolution:
     """
     Answer of least_squares().
@@ -1079,7 +1103,7 @@ class LeastSquaresSolution:
         """
 class ConstrainedIkStep:
     """
-    Answer of one step of a ConstrainedIk.
+    Answer of one cycle of a ConstrainedIk.
     """
     def __repr__(self) -> str:
         ...
@@ -1177,7 +1201,11 @@ class ConstrainedIk:
         """
     def step(self, target: typing.Any) -> ConstrainedIkStep:
         """
-        One cycle towards a pose (4, 4) of the tip in the base. Raises Error where it is none.
+        The same as update().
+        """
+    def update(self, target: typing.Any) -> ConstrainedIkStep:
+        """
+        One cycle towards a pose (4, 4) of the tip in the base. Raises Error where the target is no pose.
         """
     @property
     def chain(self) -> Chain:
@@ -1191,6 +1219,11 @@ class ConstrainedIk:
     def has_analytic(self) -> bool:
         """
         Whether the closed form is at hand.
+        """
+    @property
+    def options(self) -> dict[str, typing.Any]:
+        """
+        The options by keyword: with ** of them the constructor makes the same again.
         """
     @property
     def pose(self) -> numpy.typing.NDArray[numpy.float64]:

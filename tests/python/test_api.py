@@ -4,7 +4,6 @@ import copy
 import inspect
 import pickle
 import re
-from pathlib import Path
 
 import all_methods
 import numpy as np
@@ -323,3 +322,15 @@ def test_pose_error():
     for wrong in (np.zeros(4), [0, 0, np.nan], None):
         with pytest.raises(sk.Error, match="vector"):
             sk.rotation_exp(wrong)
+
+
+def test_constrained_ik_is_stepped_by_either_name():
+    arm, home = sk.robots.load("ur10"), sk.robots.home("ur10")
+    ours, other = sk.ConstrainedIk(arm), sk.ConstrainedIk(arm)
+    for ik in (ours, other):
+        ik.reset(home)
+    target = ours.pose.copy()
+    target[:3, 3] += [0.05, -0.02, 0.03]
+    for _ in range(50):
+        np.testing.assert_array_equal(ours.update(target).q, other.step(target).q)
+    assert np.abs(ours.q - home).max() > 1e-3

@@ -127,3 +127,25 @@ def test_defaults_of_the_stub_are_those_that_hold():
         servo.reset(home)
     for twist in np.random.default_rng(1).normal(size=(200, 6)):
         np.testing.assert_array_equal(full.update_twist(twist).qdot, bare.update_twist(twist).qdot)
+
+
+@pytest.mark.parametrize(
+    ("make", "options"),
+    [
+        (lambda arm, **o: sk.Servo(arm, sk.JParse(), **o), {"dt": 2e-3, "avoid": "manipulability", "eta2": 3.0}),
+        (lambda arm, **o: sk.Servo(arm, sk.JParse(), **o), {"posture": np.arange(6.0), "exact": [1, 0, 0, 1, 0, 0]}),
+        (lambda arm, **o: sk.Servo(arm, sk.JParse(), **o), {"mask": [1, 1, 0, 1, 1, 0], "frame": "tool"}),
+        (sk.ConstrainedIk, {"beta": [1, 2, 3, 4, 5, 6], "gamma": 0.3, "max_error": 1e-3, "jerk_limits": False}),
+        (lambda arm, **o: sk.TargetStream(**o), {"mode": "interpolate", "relocate": 7}),
+        (sk.ComputedTorque, {"gravity": [0, 0, -1.6], "damping_ratio": 0.7}),
+    ],
+)
+def test_options_are_told_again(make, options):
+    arm = sk.robots.load(ARM)
+    told = make(arm, **options).options
+    for name, value in options.items():
+        np.testing.assert_array_equal(told[name], value)
+    again = make(arm, **told).options
+    assert again.keys() == told.keys() > options.keys()
+    for name, value in told.items():
+        np.testing.assert_array_equal(again[name], value)

@@ -415,7 +415,6 @@ def test_settings_parse_a_method_once():
 
 def test_the_pages_target_is_checked():
     pytest.importorskip("viser")
-    from sigmaik.teleop.scene import singular_directions
     from sigmaik.teleop.target import TargetPose
 
     target = TargetPose.from_page((1.0, 2.0, 3.0), (1.0, 0.0, 0.0, 0.0))
@@ -427,12 +426,36 @@ def test_the_pages_target_is_checked():
     for position, wxyz in (((1.0, np.nan, 0.0), (1, 0, 0, 0)), ((0, 0, 0), (0, 0, 0, 0)), ((0, 0), (1, 0, 0, 0))):
         with pytest.raises(ValueError, match="page's target"):
             TargetPose.from_page(position, wxyz)
-    arm = sk.robots.load("franka_panda")
-    q = np.zeros(7)  # stretched out
-    linear, angular, sigma = singular_directions(arm.jacobian(q), 0.1, 1.0)
-    assert len(linear) == len(angular) == (sigma <= 0.1 * sigma[0]).sum() >= 1
-    for parts in zip(linear, angular, strict=True):
-        assert np.linalg.norm(np.concatenate(parts) @ arm.jacobian(q)) < 0.1 * sigma[0]
+
+
+@pytest.mark.parametrize("method", [sk.PseudoInverse(), sk.DampedLeastSquares(), sk.JParse()], ids=repr)
+def test_the_lines_drawn_are_the_rules_singular_directions(method):
+    from sigmaik.teleop.scene import singular_lines, task_singular_values
+
+    arm, q, length_scale = sk.robots.load("franka_panda"), np.array([0.0, 0.0, 0.0, -0.2, 0.0, 0.1, 0.0]), 0.4
+    settings = Settings(mask=(True, True, True, False, True, True), frame="tool", length_scale=length_scale)
+    servo = sk.Servo(arm, method, mask=settings.mask, frame=settings.frame, length_scale=length_scale)
+    servo.reset(q)
+    rotation = servo.pose[:3, :3]
+    step = servo.update_twist([0.01, 0.0, 0.0, 0.0, 0.0, 0.0])
+    sample = np.full((6, 6), np.nan)
+    sample[:, : step.singular_directions.shape[1]] = step.singular_directions
+    linear, angular = singular_lines(sample, length_scale)
+    assert len(linear) + len(angular) >= step.singular.sum()
+    for part in (*linear, *angular):
+        assert 0.1 < np.linalg.norm(part) <= 1.0 + 1e-12
+    if not step.singular.any():
+        assert len(linear) == len(angular) == 0
+    values = task_singular_values(arm.jacobian(q), rotation, settings)
+    np.testing.assert_allclose(values, step.singular_values, rtol=1e-9, atol=1e-12)
+
+
+def test_the_bars_are_red_where_the_rule_says_so():
+    from sigmaik.teleop.gauges import singular_bars
+
+    sigma = np.array([1.0, 0.5, 0.05])
+    assert [singular_bars(sigma, 0.1, bits).count("#d6336c") for bits in (None, 0, 0b100, 0b110)] == [1, 0, 1, 2]
+    assert singular_bars(sigma, None).count("#d6336c") == 0
 
 
 # --- the command

@@ -12,11 +12,11 @@
 /// part and an approximate part; x_d* = x_d − Δx_d ϑ is the target, slowed down by ϑ in [0, 1] (33). β is what keeps
 /// the joints from oscillating: without active limits an error decays by the factor β²/(α²+β²) a cycle.
 ///
-/// Rotations are not linearised as if they were vectors: for φ = log(R R_dᵀ), φ̇ = J_l⁻¹(φ) ω, exactly, so that large
-/// errors converge as fast as small ones.
+/// Rotations are linearised on their manifold: for φ = log(R R_dᵀ), φ̇ = J_l⁻¹(φ) ω, exactly, so that large errors
+/// converge as fast as small ones.
 ///
-/// Where not everything can be had, limits come first, then torques, then the exact part, then the largest errors
-/// allowed, then the rest: there is always an answer.
+/// Where the constraints exclude each other, limits come first, then torques, then the exact part, then the largest
+/// errors allowed, then the rest: there is always an answer.
 
 #include <array>
 #include <cstdint>
@@ -37,7 +37,7 @@ namespace sigmaik {
 
 /// Settings of ConstrainedIk. Six numbers are one a row (vx, vy, vz, ωx, ωy, ωz), in the task's axes.
 struct ConstrainedIkOptions {
-  double dt = 1e-3;                                                  ///< [s] > 0, from one step to the next
+  double dt = 1e-3;                                                  ///< [s] > 0, from one update to the next
   Task task{};                                                       ///< rows that matter at all, and their axes
   std::array<bool, 6> exact{true, true, true, false, false, false};  ///< of these, the rows to be met exactly
   Twist alpha = Twist::Ones();                                       ///< ≥ 0, weights of the error [1/m, 1/rad]
@@ -45,8 +45,8 @@ struct ConstrainedIkOptions {
   /// gives 25 ms at any dt.
   Twist beta = Twist::Constant(5.0);
   std::optional<double> gamma{};  ///< > 0, weight of the time scaling ϑ; none: ϑ = 0
-  /// > 0, largest error of the approximate rows [m, rad], each for itself; infinite for none. Let go, and said so,
-  /// where it cannot be had together with the exact part.
+  /// > 0, largest error of the approximate rows [m, rad], each for itself; infinite for none. Where the largest errors
+  /// and the exact part exclude each other, the largest errors are let go, and the step says so (error_active).
   Twist max_error = Twist::Constant(std::numeric_limits<double>::infinity());
   int iterations = 2;          ///< ≥ 1, linearisations a step
   bool torque_limits = false;  ///< hold the chain's effort limits: M q̈ + C q̇ + g, with the inertias of the chain
@@ -89,7 +89,9 @@ class ConstrainedIk {
   void reset(const JointRef& q, const JointRef& qdot = JointVector());
 
   /// One cycle towards a pose of the tip in base. Real time. A target that is not a pose: BadInput, and the arm stops.
-  ConstrainedIkStep step(const Pose& target) noexcept;
+  ConstrainedIkStep update(const Pose& target) noexcept;
+  /// The same: an older name.
+  ConstrainedIkStep step(const Pose& target) noexcept { return update(target); }
 
   /// The arm.
   const Chain& chain() const noexcept { return chain_; }
@@ -105,9 +107,15 @@ class ConstrainedIk {
   const Pose& reference() const noexcept { return reference_; }
 
  private:
+  struct Linearisation;
+
   bool try_analytic(const Pose& target, ConstrainedIkStep& step) noexcept;
   void optimise(const Pose& target, const Twist& motion, ConstrainedIkStep& step) noexcept;
+  void prepare() noexcept;
   void prepare_torques() noexcept;
+  void set_approximate_rows(const Linearisation& at, const Twist& motion) noexcept;
+  void set_exact_rows(const Linearisation& at) noexcept;
+  void report(const LeastSquaresSolution& solution, bool error_lost, ConstrainedIkStep& step) const noexcept;
 
   Chain chain_;
   ConstrainedIkOptions options_;

@@ -63,6 +63,14 @@ struct VelocityBounds {
   JointVector upper;                               ///< (n,) [rad/s or m/s]
   std::array<LimitKind, kMaxJoints> lower_kind{};  ///< which limit makes each lower bound
   std::array<LimitKind, kMaxJoints> upper_kind{};  ///< which limit makes each upper bound
+
+  /// Whether every joint's velocity is inside.
+  bool contain(const JointVector& qdot) const noexcept {
+    for (Eigen::Index i = 0; i < qdot.size(); ++i) {
+      if (!(qdot[i] >= lower[i] && qdot[i] <= upper[i])) return false;
+    }
+    return true;
+  }
 };
 
 /// Follows the command of an arm, q ← q + q̇ dt, and says before each cycle how fast each joint may go.
@@ -118,19 +126,16 @@ class LimitTracker {
   const LimitOptions& options() const noexcept { return options_; }
 
  private:
-  // Velocities are counted as they are, and all else in velocities and cycles: positions [1/dt], changes of velocity
-  // a cycle, and changes of those.
-  struct Joint {
-    double lower, upper;      // [rad or m]
-    double velocity;          // V
-    double acceleration;      // A dt
-    double braking;           // a hair less, to plan with
-    double jerk;              // J dt²
-    double recovery;          // [rad/s or m/s], infinite without a velocity limit
+  struct Window;
+  // One number a joint. Velocities are counted as they are, and all else in velocities and cycles: positions [1/dt],
+  // changes of velocity a cycle, and changes of those.
+  using Numbers = std::array<double, kMaxJoints>;
+  // Of a joint with a jerk limit: its acceleration, and the stop that is kept.
+  struct JerkMemory {
     double change = 0.0;      // v_k − v_{k−1}
     double slope = 0.0;       // of the stop that is kept, a cycle
-    double next_slope = 0.0;  // of the same, a cycle later
-    double next = 0.0;        // its velocity then
+    double next_slope = 0.0;  // the stop's slope a cycle later
+    double next = 0.0;        // the stop's velocity a cycle later
   };
 
   template <int kPadded>
@@ -139,19 +144,28 @@ class LimitTracker {
   unsigned survey() noexcept;
   void clear() noexcept;
   void update() noexcept;
-  double towards(const Joint& joint, double room) const noexcept;
-  void bound(int i) noexcept;
-  void bound_with_jerk(int i) noexcept;
+  static void put(int i, const Window& window, VelocityBounds& to) noexcept;
+  // Room to the position limits of joint i [velocities × cycles]; negative outside.
+  double room_above(int i) const noexcept { return (upper_[static_cast<std::size_t>(i)] - q_[i]) * per_dt_; }
+  double room_below(int i) const noexcept { return (q_[i] - lower_[static_cast<std::size_t>(i)]) * per_dt_; }
+  // How fast joint i comes back that is `outside` [rad or m] its position limits.
+  double recovery(int i, double outside) const noexcept;
+  // The velocity from which joint i, without a jerk limit, can just stop before a position limit that is `room` away;
+  // the velocity that takes joint i back to the limit, where the limit is behind it.
+  double towards(int i, double room) const noexcept;
+  Window window(int i, bool& broken) const noexcept;
+  Window jerk_window(int i, bool& broken) noexcept;
 
   LimitOptions options_;
   double dt_, per_dt_;
   int n_ = 0;
-  std::array<Joint, kMaxJoints> joints_{};
-  // The same by kind, for joints far from all limits, which is most of them, most of the time. Acceleration is infinite
-  // where there is more to it.
-  using Numbers = Eigen::Array<double, kMaxJoints, 1, kLayout>;
-  Numbers lower_, upper_, velocity_, acceleration_;
-  bool has_jerk_ = false;
+  Numbers lower_, upper_;        // [rad or m]
+  Numbers velocity_;             // V
+  Numbers acceleration_;         // A dt
+  Numbers jerk_;                 // J dt²
+  Numbers recovery_;             // [rad/s or m/s], infinite without a velocity limit
+  std::uint32_t with_jerk_ = 0;  // bit i: joint i has a jerk limit
+  std::array<JerkMemory, kMaxJoints> jerk_states_{};
   JointVector q_, v_, stop_;
   VelocityBounds bounds_;
   std::uint16_t outside_ = 0, recovering_ = 0;

@@ -4,7 +4,8 @@ As an npz file (numpy.load reads it, without pickles) it has an array of N rows 
 
     cycle, time [s], command (0 hold, 1 pose, 2 twist, 3 stale), configuration, restarted, status (sigmaik.Status),
     q (N, n), qdot (N, n), target (N, 4, 4), pose (N, 4, 4), pose_error (N, 6), asked_twist (N, 6),
-    achieved_twist (N, 6), singular_values (N, min(6, n)), singular, limiting_joints (bits), scale
+    achieved_twist (N, 6), singular_values (N, min(6, n)), singular (bits), singular_directions (N, 6, 6),
+    limiting_joints (bits), scale
 
 and joint_names, lower, upper, velocity, acceleration (n,) (the limits, as they were held), home (n,), before (2, n)
 (q and q̇ before the first cycle), urdf (the arm's text), and meta: JSON with robot, base, tip, dt, settings (a
@@ -222,6 +223,8 @@ def _episode(data: Any) -> Episode:
     }
     skip = {*_LIMITS, "before", "joint_names", "home", "urdf", "meta"}
     arrays = {name: data[name] for name in data.files if name not in skip}
+    if "singular_directions" not in arrays:  # of an older recording
+        arrays["singular_directions"] = np.full((len(arrays["cycle"]), 6, 6), np.nan)
     dtype = np.dtype([(name, values.dtype, values.shape[1:]) for name, values in arrays.items()])
     samples = np.empty(len(arrays["cycle"]), dtype)
     for name, values in arrays.items():

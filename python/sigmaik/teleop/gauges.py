@@ -59,13 +59,17 @@ def status_text(
     return f"<div style='{_FONT}'>{''.join(rows)}</div>"
 
 
-def singular_bars(sigma: Array, gamma: float | None) -> str:
-    """A bar for each singular value, as parts of the largest, with the threshold γ where the method has one."""
+def singular_bars(sigma: Array, gamma: float | None, singular: int | None = None) -> str:
+    """A bar for each singular value, as parts of the largest, with the threshold γ where the method has one.
+
+    Bit i of `singular`: direction i is singular to the rule; None: no rule has run, and γ says.
+    """
     largest = float(sigma[0]) if len(sigma) and sigma[0] > 0.0 else 1.0
     rows = []
     for i, value in enumerate(sigma):
         part = float(value) / largest
-        colour = _GREEN if gamma is None or part > gamma else _RED
+        by_threshold = gamma is not None and part <= gamma
+        colour = _RED if (by_threshold if singular is None else singular >> i & 1) else _GREEN
         rows.append(
             f"<div style='display:flex;gap:6px;align-items:center'><span style='width:2em'>σ{i + 1}</span>"
             f"{_bar(part, colour, gamma)}<span style='width:4em;text-align:right'>{value:.3f}</span></div>"

@@ -24,7 +24,7 @@ from sigmaik._types import Array
 from . import gauges
 from .devices import DEVICES, TwistDevice, open_device
 from .episode import Episode
-from .scene import Scene
+from .scene import Scene, task_singular_values
 from .session import Session
 from .target import TargetPose
 
@@ -381,7 +381,7 @@ class Page:
         rule = settings.rule()
         gamma = settings.gamma if hasattr(rule.method, "gamma") else None
         with self._server.atomic():
-            sigma = self._scene.draw(sample, gamma or settings.gamma, settings.length_scale)
+            self._scene.draw(sample, settings.length_scale)
             if session.goal is None:
                 self._scene.place_target(sample["pose"])
                 at = tuple(np.round(sample["pose"][:3, 3], 3).tolist())
@@ -389,13 +389,16 @@ class Page:
                     self._position.value = at
         if ticks % round(DRAWN / GAUGES):
             return
-        task = sample["singular_values"]
-        task = task[np.isfinite(task)]
+        sigma = sample["singular_values"]
+        sigma, singular = sigma[np.isfinite(sigma)], int(sample["singular"])
+        if not len(sigma):  # the arm holds: no rule has run
+            jacobian = session.chain.jacobian(sample["q"])
+            sigma, singular = task_singular_values(jacobian, sample["pose"][:3, :3], settings), None
         title = methods.TITLES[rule.family]
         self._status.content = gauges.status_text(
             sample, session.chain, title, session.statistics, session.rate, replaying
         )
-        self._sigma.content = gauges.singular_bars(task if len(task) else sigma, gamma)
+        self._sigma.content = gauges.singular_bars(sigma, gamma, singular)
         self._joints.content = gauges.joint_bars(
             sample["q"], sample["qdot"], session.chain, int(sample["limiting_joints"])
         )

@@ -6,18 +6,18 @@ import collections
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 import sigmaik as sk
 from sigmaik._types import Array
 
 from .drawing import RobotView
 from .session import Session
+from .settings import Settings
 
 if TYPE_CHECKING:
     import viser
 
-__all__ = ["Scene", "singular_directions"]
+__all__ = ["Scene", "singular_lines", "task_singular_values"]
 
 #: Colours of the tool's trace, by status.
 _TRACE = {
@@ -31,13 +31,25 @@ _LINEAR, _ANGULAR = (214, 51, 108), (151, 53, 214)
 _NOTHING = np.zeros((1, 2, 3), dtype=np.float32)
 
 
-def singular_directions(jacobian: Array, gamma: float, length_scale: float) -> tuple[Array, Array, NDArray[np.float64]]:
-    """Directions u_i with σ_i ≤ γσ_max: their linear and their angular parts (k, 3), and all σ."""
-    weighted = jacobian.copy()
-    weighted[3:] *= length_scale
-    u, sigma, _ = np.linalg.svd(weighted)
-    small = np.flatnonzero(sigma <= gamma * sigma[0])
-    return u[:3, small].T, u[3:, small].T, sigma
+def singular_lines(directions: Array, length_scale: float) -> tuple[Array, Array]:
+    """Linear and angular parts (k, 3) of a sample's singular directions (6, 6), weighted as in the task.
+
+    Parts shorter than a tenth are left out, and so are the columns of NaN that a sample has beyond its directions.
+    """
+    columns = directions[:, np.isfinite(directions).all(axis=0)]
+    linear, angular = columns[:3].T, length_scale * columns[3:].T
+    long_linear, long_angular = (part[np.linalg.norm(part, axis=1) > 0.1] for part in (linear, angular))
+    return long_linear, long_angular
+
+
+def task_singular_values(jacobian: Array, rotation: Array, settings: Settings) -> Array:
+    """Singular values of the weighted task Jacobian, where no cycle says them; `rotation` (3, 3): tip in base."""
+    rows = jacobian.copy()
+    if settings.frame == "tool":
+        rows[:3], rows[3:] = rotation.T @ rows[:3], rotation.T @ rows[3:]
+    rows[3:] *= settings.length_scale
+    sigma: Array = np.linalg.svd(rows[list(settings.mask)], compute_uv=False)
+    return sigma
 
 
 class Scene:
@@ -71,6 +83,8 @@ class Scene:
         )
         self._trace: collections.deque[tuple[Array, tuple[int, int, int]]] = collections.deque(maxlen=_TRACE_LENGTH)
         self._chain, self._ticks = session.chain, 0
+        # Of the last cycle that resolved a twist, and where the arm was.
+        self._directions, self._resolved_at = np.full((6, 6), np.nan), np.full(session.chain.dof, np.inf)
 
     def place_target(self, pose: Array) -> None:
         """Puts the gizmo at a pose."""
@@ -79,8 +93,8 @@ class Scene:
     def clear_trace(self) -> None:
         self._trace.clear()
 
-    def draw(self, sample: Any, gamma: float, length_scale: float) -> Array:
-        """Draws a sample. Returns the singular values (min(6, n),) at its q."""
+    def draw(self, sample: Any, length_scale: float) -> None:
+        """Draws a sample. While the arm holds, the singular directions of the last command stay."""
         pose, q = sample["pose"], sample["q"]
         self.robot.show(q)
         _place(self.tool, pose)
@@ -96,9 +110,12 @@ class Scene:
         self.ellipsoid.scale = tuple(np.maximum(0.2 * radii, 2e-3 * self.reach).tolist())
         _place(self.ellipsoid, ellipsoid)
 
-        linear, angular, sigma = singular_directions(jacobian, gamma, length_scale)
-        for handle, parts in ((self.linear, linear), (self.angular, angular)):
-            shown = parts[np.linalg.norm(parts, axis=1) > 0.1]
+        if np.isfinite(sample["singular_values"]).any():
+            self._directions, self._resolved_at = sample["singular_directions"].copy(), q.copy()
+        elif np.abs(q - self._resolved_at).max() > 0.05:  # put elsewhere since
+            self._directions = np.full((6, 6), np.nan)
+        lines = singular_lines(self._directions, length_scale)
+        for handle, shown in zip((self.linear, self.angular), lines, strict=True):
             handle.visible = bool(len(shown))
             if len(shown):
                 handle.points = np.stack([at - size * shown, at + size * shown], axis=1).astype(np.float32)
@@ -117,7 +134,6 @@ class Scene:
             colours = np.array([c for _, c in self._trace], dtype=np.uint8)
             self.trace.points = np.stack([points[:-1], points[1:]], axis=1)
             self.trace.colors = np.stack([colours[:-1], colours[1:]], axis=1)
-        return sigma
 
 
 def _place(handle: Any, pose: Array) -> None:

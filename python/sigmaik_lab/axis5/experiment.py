@@ -219,7 +219,7 @@ def run(motion: Motion, variant: str, settings: Axis5Settings, progress: Callabl
     clock, standing, k = 0.0, 0.0, 0
     while k < _MOST_SAMPLES and standing < _STUCK and clock < (samples - 0.5) * dt:
         k += 1
-        step = ik.step(motion.target(clock + dt))
+        step = ik.update(motion.target(clock + dt))
         clock = clock + (1.0 - step.time_scale) * dt if step.time_scale > 0.0 else clock + dt
         standing = standing + dt if step.time_scale > 1.0 - 1e-6 else 0.0
         recorder.add(clock, step.q, step.error, step.path_error, step)

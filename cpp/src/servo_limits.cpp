@@ -1,0 +1,112 @@
+// What joint limits leave of the rule's answer: where the arm heads, and how far it gets there in this cycle.
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <sigmaik/servo.hpp>
+
+namespace sigmaik {
+namespace {
+
+// A twist that misses this part of itself counts as done.
+constexpr double kDone = 1e-4;
+
+// from + s (to − from) for the largest s in [0, 1] that is inside the bounds; where no s is, for the largest s that is
+// nearest to them. Sets the bits of the joints that decide s.
+JointVector furthest(const JointVector& from, const JointVector& to, const VelocityBounds& bounds,
+                     std::uint16_t& limiting) noexcept {
+  const auto n = from.size();
+  const JointVector way = to - from;
+  // By more than rounding.
+  const auto moves = [&](Eigen::Index i) { return std::abs(way[i]) > 1e-12 * std::abs(from[i]); };
+  double least = 0.0, s = 1.0;
+  for (Eigen::Index i = 0; i < n; ++i) {
+    if (!moves(i)) continue;
+    const bool up = way[i] > 0.0;
+    s = std::min(s, ((up ? bounds.upper : bounds.lower)[i] - from[i]) / way[i]);
+    least = std::max(least, ((up ? bounds.lower : bounds.upper)[i] - from[i]) / way[i]);
+  }
+  const bool meets = s >= least;
+  if (!meets) {
+    // Half the derivative of the squared distance never falls.
+    const double size = way.cwiseAbs().maxCoeff();
+    const auto slope = [&](double at) {
+      double sum = 0.0;
+      for (Eigen::Index i = 0; i < n; ++i) {
+        const double v = from[i] + at * way[i];
+        sum += way[i] / size * (v - std::clamp(v, bounds.lower[i], bounds.upper[i]));
+      }
+      return sum;
+    };
+    s = 1.0;
+    if (slope(1.0) > 0.0) {
+      s = 0.0;
+      for (double part = 0.5; part > 1e-17; part *= 0.5) {
+        if (!(slope(s + part) > 0.0)) s += part;
+      }
+    }
+  }
+  JointVector at = from + s * way;
+  bool rounded = meets;
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const double more = at[i] + 1e-9 * way[i];
+    const bool beyond = at[i] > bounds.upper[i] || at[i] < bounds.lower[i];
+    if (beyond || more > bounds.upper[i] || more < bounds.lower[i]) limiting |= static_cast<std::uint16_t>(1u << i);
+    rounded = rounded && (!beyond || moves(i));
+  }
+  return rounded ? at.cwiseMax(bounds.lower).cwiseMin(bounds.upper) : at;  // not by rounding beyond what it meets
+}
+
+}  // namespace
+
+void Servo::limit(ServoStep& step) noexcept {
+  const JointVector asked = step.qdot;
+  head(step);
+  approach(step);
+  judge(asked, step);
+}
+
+// Position and velocity limits: the velocity at which to arrive, in time.
+void Servo::head(ServoStep& step) noexcept {
+  const VelocityBounds heading = tracker_.heading();
+  if (heading.contain(step.qdot)) return;
+  if (options_.on_limit == OnLimit::Redistribute) {
+    step.qdot = redistribute(step.qdot, heading, step);
+  } else {
+    const JointVector rest = JointVector::Zero(chain_.dof());
+    step.qdot = furthest(rest, step.qdot, heading, step.limiting_joints);
+  }
+}
+
+// Acceleration and jerk limits: how much of the way from the last velocity to the heading fits into this cycle.
+void Servo::approach(ServoStep& step) noexcept {
+  const VelocityBounds& bounds = tracker_.bounds();
+  if (bounds.contain(step.qdot)) return;
+  step.qdot = furthest(tracker_.qdot(), step.qdot, bounds, step.limiting_joints);
+  if (options_.on_limit == OnLimit::Redistribute && !bounds.contain(step.qdot)) {
+    step.qdot = redistribute(step.qdot, bounds, step);
+  }
+  step.qdot = step.qdot.cwiseMax(bounds.lower).cwiseMin(bounds.upper);
+}
+
+// How much of the rule's twist is left, along itself and in the weights of the rule, and how much is missed at all.
+void Servo::judge(const JointVector& asked, ServoStep& step) const noexcept {
+  const Spectrum& spectrum = solver_.spectrum();
+  // Divided by the largest entry, so that squares do not overflow.
+  const double size = std::max(asked.cwiseAbs().maxCoeff(), std::numeric_limits<double>::min());
+  double along = 0.0, whole = 0.0, missed = 0.0;
+  for (int i = 0; i < spectrum.size(); ++i) {
+    const double part = spectrum.sigma(i) * (spectrum.v(i).dot(asked) / size);
+    const double done = spectrum.sigma(i) * (spectrum.v(i).dot(step.qdot) / size);
+    along += part * done;
+    whole += part * part;
+    missed += (part - done) * (part - done);
+  }
+  if (missed > kDone * kDone * whole) {
+    step.scale = along >= whole ? 1.0 : along > 0.0 ? along / whole : 0.0;  // 0 where nothing was asked (NaN)
+    step.status = Status::Limited;
+  }
+}
+
+}  // namespace sigmaik
