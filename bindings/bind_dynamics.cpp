@@ -117,7 +117,8 @@ void bind_computed_torque(py::module_& m) {
           },
           py::arg("q"), py::arg("qdot"), py::arg("q_desired"), py::arg("qdot_desired"), py::arg("qddot_desired"),
           "One cycle: the arm is at q, q̇ (n,), and should be at q_d, q̇_d, accelerating by q̈_d.")
-      .def("__repr__", [](const ComputedTorque& c) { return record("ComputedTorque", {{"dof", py::cast(c.dof())}}); });
+      .def("__repr__",
+           [](const ComputedTorque& control) { return record("ComputedTorque", {{"dof", py::cast(control.dof())}}); });
 }
 
 }  // namespace
