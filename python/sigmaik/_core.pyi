@@ -8,9 +8,14 @@ import numpy
 import numpy.typing
 import os
 import pathlib
+from sigmaik import ModelWarning
 import sigmaik.planning.status
 import typing
-__all__: list[str] = ['AdaptiveDampedLeastSquares', 'AnalyticBranch', 'AnalyticIk', 'ArgumentError', 'ArmSpheres', 'CartError', 'CartMeasures', 'CartMotion', 'CartRegion', 'Chain', 'Clearance', 'ComputedTorque', 'ComputedTorqueStep', 'ConstrainedIk', 'ConstrainedIkStep', 'Crossing', 'DEFAULT_SCALE', 'DampedLeastSquares', 'DistanceField', 'Dynamics', 'Error', 'Inertia', 'JParse', 'JacobianProjection', 'JacobianSafety', 'JacobianSafetyProjection', 'JointCost', 'JointLimits', 'LeastSquaresSolution', 'LoopCommand', 'LoopStatistics', 'Method', 'PlaneCartMotion', 'Playback', 'PseudoInverse', 'SampleCounts', 'SampleStatus', 'Segment', 'SelectivelyDampedLeastSquares', 'Servo', 'ServoLoop', 'ServoStep', 'SingularSets', 'Solution', 'Spectrum', 'Status', 'StreamStatus', 'SupportPlanner', 'SupportStates', 'Target', 'TargetStream', 'TimeOptimal', 'TimeOptimalResult', 'Trajectory', 'VelocitySolver', 'admissible_guess', 'cart_descent', 'cart_motion', 'cart_motion_by_descent', 'clearance', 'collision_cost', 'evaluate_cart_motion', 'evaluate_cart_motion_plane', 'evaluate_index', 'forbidden_intervals', 'geometry_aware_cost', 'index_of_jacobian', 'joint_limit_cost', 'known_singular_sets', 'least_squares', 'load_singular_sets', 'log_manipulability_cost', 'manipulability_cost', 'min_distance', 'plane_cart_motion', 'play', 'pose_error', 'potential_cost', 'reference_scale', 'rotation_exp', 'rotation_log', 'rules', 'scaled_cost', 'self_collision_cost', 'self_collision_pairs', 'singular_sets_of', 'solve_batch', 'spline_velocities', 'sum_of_costs', 'taut_string']
+__all__: list[str] = ['AdaptiveDampedLeastSquares', 'AnalyticBranch', 'AnalyticIk', 'ArgumentError', 'ArmSpheres', 'CartError', 'CartMeasures', 'CartMotion', 'CartRegion', 'Chain', 'Clearance', 'ComputedTorque', 'ComputedTorqueStep', 'ConstrainedIk', 'ConstrainedIkStep', 'Crossing', 'DEFAULT_SCALE', 'DampedLeastSquares', 'DistanceField', 'Dynamics', 'Error', 'Inertia', 'JParse', 'JacobianProjection', 'JacobianSafety', 'JacobianSafetyProjection', 'JointCost', 'JointLimits', 'LeastSquaresSolution', 'LoopCommand', 'LoopStatistics', 'Method', 'ModelWarning', 'PlaneCartMotion', 'Playback', 'PseudoInverse', 'SampleCounts', 'SampleStatus', 'Segment', 'SelectivelyDampedLeastSquares', 'Servo', 'ServoLoop', 'ServoStep', 'SingularSets', 'Solution', 'Spectrum', 'Status', 'StreamStatus', 'SupportPlanner', 'SupportStates', 'Target', 'TargetStream', 'TimeOptimal', 'TimeOptimalResult', 'Trajectory', 'VelocitySolver', 'admissible_guess', 'cart_descent', 'cart_motion', 'cart_motion_by_descent', 'clearance', 'collision_cost', 'evaluate_cart_motion', 'evaluate_cart_motion_plane', 'evaluate_index', 'forbidden_intervals', 'geometry_aware_cost', 'index_of_jacobian', 'joint_limit_cost', 'known_singular_sets', 'least_squares', 'load_singular_sets', 'log_manipulability_cost', 'manipulability_cost', 'min_distance', 'plane_cart_motion', 'play', 'pose_error', 'potential_cost', 'reference_scale', 'rotation_exp', 'rotation_log', 'rules', 'scaled_cost', 'self_collision_cost', 'self_collision_pairs', 'singular_sets_of', 'solve_batch', 'spline_velocities', 'sum_of_costs', 'taut_string']
+DEFAULT_SCALE: float = 6.0
+__version__: str
+
+# ---- Status -----------------------------------------------------------------------------------------------------------
 class Error(ValueError):
     """
     What set-up and checked calls refuse. The text carries the facts.
@@ -28,10 +33,29 @@ class Status(enum.IntEnum):
     HOLDING = ...
     LIMITED = ...
     OK = ...
+def pose_error(current: typing.Any, target: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    [e_p; e_o] (6,) that takes `current` to `target` (4×4 poses in one frame).
+
+    e_p [m] is the difference of the origins, e_o [rad] the axis-angle vector of R_target R_currentᵀ, both in the
+    axes of that frame. Right up to and at a half turn.
+    """
+def rotation_exp(vector: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Rotation (3, 3) about `vector` by its length [rad].
+    """
+def rotation_log(rotation: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Axis times angle [rad] (3,) of a 3×3 rotation, angle in [0, π].
+    """
+
+# ---- Chain ------------------------------------------------------------------------------------------------------------
 class JointLimits:
     """
     Limits of a chain's movable joints, (n,) each, infinite where there is none.
     """
+    def __repr__(self) -> str:
+        ...
     @property
     def acceleration(self) -> numpy.typing.NDArray[numpy.float64]:
         """
@@ -144,7 +168,8 @@ class Chain:
         acceleration: (n,) limits [rad/s² or m/s²]; by default those of the file, whose <limit> elements may carry
         an attribute `acceleration` (an extension), else infinite.
 
-        Raises Error with the facts for anything that is not a usable serial arm of 1 to 16 movable joints.
+        Raises Error with the facts for anything that is not a usable serial arm of 1 to 16 movable joints, and warns
+        (ModelWarning) of velocity limits of zero, which count as none, and of inertias that no rigid body has.
         """
     def __repr__(self) -> str:
         ...
@@ -155,6 +180,10 @@ class Chain:
     def jacobian_gradient(self, q: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
         """
         ∂J/∂q_k (n, 6, n) at q (n,), k first; (B, n, 6, n) at q (B, n).
+        """
+    def missing_limits(self, *, velocity: bool = True, acceleration: bool = True) -> tuple[str, ...]:
+        """
+        Velocity and acceleration limits that joints lack, one sentence a kind: a servo cannot hold these.
         """
     def pose(self, q: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
         """
@@ -205,6 +234,13 @@ class Chain:
         """
         Name of the tip link.
         """
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """
+        What is wrong with the model and does not keep the arm from moving, one sentence each.
+        """
+
+# ---- Analytic IK ------------------------------------------------------------------------------------------------------
 class AnalyticBranch:
     """
     One posture of a pose, from AnalyticIk.branches().
@@ -272,6 +308,8 @@ class AnalyticIk:
         """
         The arm.
         """
+
+# ---- Methods ----------------------------------------------------------------------------------------------------------
 class Method:
     """
     A rule with its parameters: what a method does with each singular direction. The base class of all of them.
@@ -473,6 +511,12 @@ class JacobianSafetyProjection(Method):
         """
         threshold in (0, 1] on σ_i/σ_max.
         """
+def rules() -> tuple[type[Method], ...]:
+    """
+    The class of every rule, in the order of lists and tables.
+    """
+
+# ---- Solver -----------------------------------------------------------------------------------------------------------
 class Spectrum:
     """
     Singular value decomposition J = U diag(σ) Vᵀ by one-sided Jacobi rotations.
@@ -481,6 +525,8 @@ class Spectrum:
     are not unique.
     """
     def __init__(self) -> None:
+        ...
+    def __repr__(self) -> str:
         ...
     def decompose(self, J: numpy.typing.ArrayLike) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
         """
@@ -543,6 +589,8 @@ class VelocitySolver:
         mask: which of the six rows (vx, vy, vz, ωx, ωy, ωz) matter; all by default.
         frame: the axes of these rows, 'base' or 'tool'.
         """
+    def __repr__(self) -> str:
+        ...
     def reset(self) -> None:
         """
         Forgets the warm start.
@@ -572,6 +620,15 @@ class VelocitySolver:
     @method.setter
     def method(self, arg1: Method | str) -> None:
         ...
+def solve_batch(method: Method | str, J: numpy.typing.ArrayLike, twist: numpy.typing.ArrayLike, length_scale: typing.SupportsFloat | typing.SupportsIndex = 1.0, threads: typing.SupportsInt | typing.SupportsIndex = 1) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Joint velocities (B, n) for B independent problems, J (B, m, n) and twist (B, m), without the GIL.
+
+    Each is solved as by a fresh VelocitySolver, so order and number of threads do not change the answers.
+    Raises Error where a shape is wrong or an entry is not finite.
+    """
+
+# ---- Servo ------------------------------------------------------------------------------------------------------------
 class ServoStep:
     """
     Answer of one cycle of a Servo.
@@ -645,6 +702,8 @@ class Servo:
     """
     def __init__(self, chain: Chain, method: Method | str, dt: typing.SupportsFloat | typing.SupportsIndex = 0.001, *, gain_linear: typing.SupportsFloat | typing.SupportsIndex = 5.0, gain_angular: typing.SupportsFloat | typing.SupportsIndex = 5.0, max_linear_error: typing.SupportsFloat | typing.SupportsIndex = 0.25, max_angular_error: typing.SupportsFloat | typing.SupportsIndex = 1.0, soft_start: typing.SupportsFloat | typing.SupportsIndex = 0.1, posture: numpy.typing.ArrayLike | None = None, posture_gain: typing.SupportsFloat | typing.SupportsIndex = 0.0, posture_max_speed: typing.SupportsFloat | typing.SupportsIndex = ..., avoid: typing.Literal['manipulability', 'potential'] | None = None, avoid_gain: typing.SupportsFloat | typing.SupportsIndex = 1.0, avoid_max_speed: typing.SupportsFloat | typing.SupportsIndex = 0.5, eta1: typing.SupportsFloat | typing.SupportsIndex = 0.0, eta2: typing.SupportsFloat | typing.SupportsIndex = 10.0, position_limits: bool = True, velocity_limits: bool = True, acceleration_limits: bool = True, jerk_limits: bool = True, recovery_speed: typing.SupportsFloat | typing.SupportsIndex = 0.1, on_limit: typing.Literal['redistribute', 'scale'] = 'redistribute', exact: numpy.typing.ArrayLike | None = (0, 0, 0, 0, 0, 0), length_scale: typing.SupportsFloat | typing.SupportsIndex = 1.0, mask: numpy.typing.ArrayLike | None = (1, 1, 1, 1, 1, 1), frame: typing.Literal['base', 'tool'] = 'base') -> None:
         """
+        Warns (ModelWarning) of velocity and acceleration limits that joints lack.
+
         dt: [s] > 0, from one update to the next.
         gain_linear: [1/s] ≥ 0, from position error to velocity. (JParse's gain_linear is another thing: the
             paper's K.)
@@ -678,6 +737,8 @@ class Servo:
         mask: (6,) truth values: the rows (vx, vy, vz, ωx, ωy, ωz) that matter; None: all.
         frame: the axes of these rows, the base's or the tool's.
         """
+    def __repr__(self) -> str:
+        ...
     def continue_from(self, other: Servo) -> None:
         """
         Takes over from another servo of the same arm and dt, in the midst of its motion.
@@ -693,6 +754,7 @@ class Servo:
         Starts, or starts again, at q (n,): forgets all history, and pins the posture there unless one was given.
 
         qdot: (n,) how the arm moves now, from which the command is faded; None: it stands.
+        Warns (ModelWarning) of a joint that starts more than 1 rad or 1 m outside its limits.
         """
     def update(self, target: typing.Any, feedforward: numpy.typing.ArrayLike | None = None) -> ServoStep:
         """
@@ -737,6 +799,8 @@ class Servo:
         """
         (n,) where the reference stands.
         """
+
+# ---- Servo loop -------------------------------------------------------------------------------------------------------
 class LoopCommand(enum.IntEnum):
     """
     What a cycle of a ServoLoop followed.
@@ -749,6 +813,8 @@ class LoopStatistics:
     """
     How a ServoLoop keeps its rate.
     """
+    def __repr__(self) -> str:
+        ...
     @property
     def cycles(self) -> int:
         ...
@@ -794,6 +860,8 @@ class ServoLoop:
         history: samples kept for read(), a power of 2.
         priority: of SCHED_FIFO, 1 to 99; 0 is the ordinary scheduler.
         """
+    def __repr__(self) -> str:
+        ...
     def configure(self, servo: Servo, restart: bool = False) -> int:
         """
         Goes on with another servo (a copy) of the same arm and dt: other rule, other options.
@@ -842,6 +910,8 @@ class ServoLoop:
     @property
     def statistics(self) -> LoopStatistics:
         ...
+
+# ---- Target stream ----------------------------------------------------------------------------------------------------
 class StreamStatus(enum.IntEnum):
     """
     What a target is, ordered from the best to the worst.
@@ -938,6 +1008,8 @@ class TargetStream:
         acceleration_angular: [rad/s²] > 0, likewise.
         relocate: ≥ 1: so many refused samples in a row that agree with each other are believed.
         """
+    def __repr__(self) -> str:
+        ...
     def at(self, time: typing.SupportsFloat | typing.SupportsIndex) -> Target:
         """
         The target at a time [s] not before that of the last call; else the last one again.
@@ -961,6 +1033,8 @@ class TargetStream:
         """
         The options by keyword: with ** of them the constructor makes the same again.
         """
+
+# ---- Dynamics ---------------------------------------------------------------------------------------------------------
 class Dynamics:
     """
     Rigid-body dynamics M(q) q̈ + C(q, q̇) q̇ + g(q) = τ of a chain with what it carries, by KDL.
@@ -973,6 +1047,8 @@ class Dynamics:
         Raises Error where a movable joint carries no link whose inertia is known, and where the payload is no body:
         a mass below 0, a tensor that is not symmetric, a principal moment beyond the sum of the other two.
         """
+    def __repr__(self) -> str:
+        ...
     def coriolis(self, q: numpy.typing.ArrayLike, qdot: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
         """
         C(q, q̇) q̇ (n,) [N·m] at q and q̇ (n,).
@@ -1042,6 +1118,8 @@ class ComputedTorque:
         gravity: (3,) [m/s²] in base axes, as the controller knows it.
         payload: what the controller knows of the tip's load, in the tip's frame, as for Dynamics.
         """
+    def __repr__(self) -> str:
+        ...
     def update(self, q: numpy.typing.ArrayLike, qdot: numpy.typing.ArrayLike, q_desired: numpy.typing.ArrayLike, qdot_desired: numpy.typing.ArrayLike, qddot_desired: numpy.typing.ArrayLike) -> ComputedTorqueStep:
         """
         One cycle: the arm is at q, q̇ (n,), and should be at q_d, q̇_d, accelerating by q̈_d.
@@ -1056,10 +1134,14 @@ class ComputedTorque:
         """
         The options by keyword: with ** of them the constructor makes the same again.
         """
+
+# ---- Least squares ----------------------------------------------------------------------------------------------------
 class LeastSquaresSolution:
     """
     Answer of least_squares().
     """
+    def __repr__(self) -> str:
+        ...
     @property
     def active(self) -> tuple[int, ...]:
         """
@@ -1101,6 +1183,17 @@ class LeastSquaresSolution:
         """
         (n,) inside the bounds exactly
         """
+def least_squares(A: numpy.typing.ArrayLike | None = None, b: numpy.typing.ArrayLike | None = None, *, C: numpy.typing.ArrayLike | None = None, d: numpy.typing.ArrayLike | None = None, lower: numpy.typing.ArrayLike | None = None, upper: numpy.typing.ArrayLike | None = None, G: numpy.typing.ArrayLike | None = None, h: numpy.typing.ArrayLike | None = None) -> LeastSquaresSolution:
+    """
+    min |A x − b|² where C x = d, lower ≤ x ≤ upper, G x ≤ h; of these the shortest x.
+
+    A (m, n), b (m,), C (p, n), d (p,), lower, upper (n,), G (k, n), h (k,); n ≤ 24, m ≤ 32, p ≤ 8, k ≤ 32.
+    Bounds and h may be infinite.
+
+    There is always an answer: the bounds hold, then G x ≤ h as well as possible, then C x = d, then A x ≈ b.
+    """
+
+# ---- Constrained IK ---------------------------------------------------------------------------------------------------
 class ConstrainedIkStep:
     """
     Answer of one cycle of a ConstrainedIk.
@@ -1169,6 +1262,8 @@ class ConstrainedIk:
     """
     def __init__(self, chain: Chain, dt: typing.SupportsFloat | typing.SupportsIndex = 0.001, *, exact: numpy.typing.ArrayLike | None = (1, 1, 1, 0, 0, 0), alpha: numpy.typing.ArrayLike | None = 1.0, beta: numpy.typing.ArrayLike | None = 5.0, gamma: typing.SupportsFloat | typing.SupportsIndex | None = None, max_error: numpy.typing.ArrayLike | None = ..., iterations: typing.SupportsInt | typing.SupportsIndex = 2, torque_limits: bool = False, analytic: bool = True, mask: numpy.typing.ArrayLike | None = (1, 1, 1, 1, 1, 1), frame: typing.Literal['base', 'tool'] = 'base', gravity: numpy.typing.ArrayLike | None = (0.0, 0.0, -9.80665), position_limits: bool = True, velocity_limits: bool = True, acceleration_limits: bool = True, jerk_limits: bool = True, recovery_speed: typing.SupportsFloat | typing.SupportsIndex = 0.1) -> None:
         """
+        Warns (ModelWarning) of velocity and acceleration limits that joints lack.
+
         dt: [s] > 0, from one update to the next.
         exact: (6,) truth values: the rows (vx, vy, vz, ωx, ωy, ωz) met exactly; the others as well as
             limits allow.
@@ -1195,9 +1290,13 @@ class ConstrainedIk:
         recovery_speed: in (0, 1], of the velocity limit: the least speed at which a joint that starts
             outside its position limits comes back.
         """
+    def __repr__(self) -> str:
+        ...
     def reset(self, q: numpy.typing.ArrayLike, qdot: numpy.typing.ArrayLike | None = None) -> None:
         """
         Starts, or starts again, at q (n,), moving with qdot (n,).
+
+        Warns (ModelWarning) of a joint that starts more than 1 rad or 1 m outside its limits.
         """
     def step(self, target: typing.Any) -> ConstrainedIkStep:
         """
@@ -1240,6 +1339,23 @@ class ConstrainedIk:
         """
         (4, 4) the pose that the last step aimed at: its target, slowed down by ϑ.
         """
+
+# ---- Indices ----------------------------------------------------------------------------------------------------------
+def evaluate_index(chain: Chain, q: numpy.typing.ArrayLike, index: str, k: numpy.typing.ArrayLike = 6.0, length_scale: typing.SupportsFloat | typing.SupportsIndex = 1.0, threads: typing.SupportsInt | typing.SupportsIndex = 1, gradients: bool = True) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
+    """
+    Values () or (B,) and, where asked for, gradients (n,) or (B, n) at q (n,) or (B, n).
+    """
+def index_of_jacobian(J: numpy.typing.ArrayLike, index: str, k: numpy.typing.ArrayLike = 6.0, length_scale: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> float | numpy.typing.NDArray[numpy.float64]:
+    """
+    An index of J (m, n), or (B,) of J (B, m, n).
+    """
+def reference_scale(chain: Chain, length_scale: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> float:
+    """
+    k of a chain: 6 where the largest eigenvalue of JJᵀ over its joint ranges stays below that by a tenth, else 1.1
+    times that eigenvalue, so that the sphere kI holds every ellipsoid. The same on every machine; takes a few ms.
+    """
+
+# ---- Singularities ----------------------------------------------------------------------------------------------------
 class SingularSets:
     """
     The known singular sets of an arm: potentials around them, and its manipulability in closed
@@ -1326,11 +1442,20 @@ class SingularSets:
         """
         Of the sets, c of them.
         """
+def known_singular_sets() -> tuple[str, ...]:
+    ...
+def load_singular_sets(name: str) -> SingularSets:
+    ...
+def singular_sets_of(chain: Chain) -> SingularSets | None:
+    ...
+
+# ---- Trajectory -------------------------------------------------------------------------------------------------------
 class Crossing:
     """
     A motion goes through a singular set here, or so near to it that the set's potential does not
     tell the difference.
     """
+    __hash__: typing.ClassVar[None] = None
     def __eq__(self, other: typing.Any) -> bool:
         ...
     def __getstate__(self) -> tuple[str, float, list[float], float, bool]:
@@ -1601,6 +1726,150 @@ class Playback:
         """
         (M,) [s] times of the trajectory, and those for which its end is held.
         """
+def clearance(chain: Chain, sets: SingularSets | None, t: numpy.typing.ArrayLike, q: numpy.typing.ArrayLike, *, width: typing.SupportsFloat | typing.SupportsIndex = 400.0) -> Clearance:
+    """
+    Clearance of the configurations q (M, n) at increasing times t (M,) [s].
+
+    sets: the arm's singular sets, or None.
+    width: η₂ [1/rad²]: sets of codimension above 1 count as crossed where ψ < 1/(2 width) between ends that are
+        both outside.
+    """
+def play(trajectory: Trajectory, servo: Servo, *, settle: typing.SupportsFloat | typing.SupportsIndex = 0.5) -> Playback:
+    """
+    Plays a planned motion through a servo that stands at its start, as poses with feed-forward twists, at the
+    servo's dt.
+
+    In the cycle from t to t + dt the target is the pose planned for t, and the feed-forward twist is J(q) q̇ of
+    the plan in the middle of the cycle. A cycle of constant q̇ leaves the error ½ dt² J̇ q̇, and the gains keep
+    the sum of these errors to ½ dt |J̇ q̇| / gain: micrometres at 1 kHz. The soft start costs more. The servo
+    holds its limits and treats singularities by its own rule, so it may leave the plan; its gains bring it back.
+    The servo's history goes on: call `servo.reset` before.
+
+    settle: [s] for which the last pose is held.
+
+    Raises Error where the trajectory is empty or has other joints, the servo stands elsewhere (1e-6 rad or m), or
+    settle is not finite or negative.
+    """
+
+# ---- Obstacles --------------------------------------------------------------------------------------------------------
+class DistanceField:
+    """
+    Signed distances [m] to obstacles on a regular grid, interpolated trilinearly: positive in
+    free space, negative inside. Outside the grid: continuous, growing, and no more than the
+    distance to what lies within.
+    """
+    def __init__(self, distances: numpy.typing.ArrayLike, origin: numpy.typing.ArrayLike, cell: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        """
+        distances (X, Y, Z) [m] at the nodes, the first of which is at `origin` (3,) [m] in the axes of the arm's base;
+        `cell` [m] from node to node.
+        """
+    def __repr__(self) -> str:
+        ...
+    def distance(self, points: numpy.typing.ArrayLike) -> float | numpy.typing.NDArray[numpy.float64]:
+        """
+        [m] at a point (3,), or (M,) at points (M, 3).
+        """
+    def gradient(self, points: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Gradient (3,) of the distance at a point (3,), or (M, 3) at points (M, 3).
+        """
+    @property
+    def cell(self) -> float:
+        """
+        [m]
+        """
+    @property
+    def origin(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3,) [m] of the first node.
+        """
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """
+        Nodes along each axis.
+        """
+class ArmSpheres:
+    """
+    An arm as S spheres fixed to its links, in the order in which joints move them, base to tip.
+
+    `sigmaik.planning.arm_spheres` makes them from a URDF, or along the links.
+    """
+    @staticmethod
+    def along_links(chain: Chain, radius: typing.SupportsFloat | typing.SupportsIndex = 0.05) -> ArmSpheres:
+        """
+        Capsules from each link's frame to the next.
+        """
+    @staticmethod
+    def from_urdf(chain: Chain, source: typing.Any, radius: typing.SupportsFloat | typing.SupportsIndex = 0.05) -> ArmSpheres:
+        """
+        Covers the boxes, cylinders and spheres of a URDF; links with meshes as along_links does.
+        """
+    def __init__(self, chain: Chain, links: collections.abc.Sequence[str], centers: numpy.typing.ArrayLike, radii: numpy.typing.ArrayLike) -> None:
+        """
+        links: the name of each sphere's link; centers (S, 3) [m] in the link's frame; radii (S,) [m].
+        """
+    def __len__(self) -> int:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def centers(self, q: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (S, 3) [m] in the base's axes at q (n,); (B, S, 3) at q (B, n).
+        """
+    def jacobians(self, q: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        ∂center/∂q (S, 3, n) at q (n,); (B, S, 3, n) at q (B, n).
+        """
+    @property
+    def chain(self) -> Chain:
+        """
+        The arm.
+        """
+    @property
+    def first_moving(self) -> int:
+        """
+        The first sphere that a joint moves; those before it belong to the base.
+        """
+    @property
+    def links(self) -> tuple[str, ...]:
+        """
+        The name of each sphere's link.
+        """
+    @property
+    def local_centers(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (S, 3) [m] in the link's frame.
+        """
+    @property
+    def radii(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (S,) [m]
+        """
+def collision_cost(spheres: ArmSpheres, field: DistanceField, clearance: typing.SupportsFloat | typing.SupportsIndex = 0.05, weight: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> JointCost:
+    """
+    weight · Σ c(d) over the spheres that move, d the signed distance of their surfaces to the obstacles.
+    """
+def joint_limit_cost(chain: Chain, margin: typing.SupportsFloat | typing.SupportsIndex = 0.1, weight: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> JointCost:
+    """
+    weight · Σ ½x², x the way by which a joint is nearer to a limit than `margin` [rad or m], or beyond it.
+    """
+def min_distance(spheres: ArmSpheres, field: DistanceField, q: numpy.typing.ArrayLike, threads: typing.SupportsInt | typing.SupportsIndex = 1) -> float | numpy.typing.NDArray[numpy.float64]:
+    """
+    The least signed distance [m] from a sphere that moves to the obstacles at q (n,), or (B,) at q (B, n).
+    """
+def self_collision_cost(spheres: ArmSpheres, pairs: numpy.typing.ArrayLike | None = None, clearance: typing.SupportsFloat | typing.SupportsIndex = 0.02, weight: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> JointCost:
+    """
+    weight · Σ c(d) over pairs of spheres (P, 2), by default `self_collision_pairs(spheres, clearance)`;
+    d the distance of their surfaces, c(d) as in `collision_cost`.
+    """
+def self_collision_pairs(spheres: ArmSpheres, clearance: typing.SupportsFloat | typing.SupportsIndex = 0.02, most_contacts: typing.SupportsFloat | typing.SupportsIndex = 0.1) -> numpy.typing.NDArray[numpy.int32]:
+    """
+    (P, 2) spheres of links that are not neighbours, but for those nearer than `clearance` [m] at more than a share
+    `most_contacts` (0 … 1) of a thousand configurations within the joint limits. The same on every machine; takes some
+    ms.
+    """
+
+# ---- Planning ---------------------------------------------------------------------------------------------------------
 class JointCost:
     """
     A smooth cost of joint positions, with its derivatives.
@@ -1733,6 +2002,42 @@ class TimeOptimal:
 
         Raises Error where an end is outside its limits. One call at a time for each object.
         """
+def geometry_aware_cost(chain: Chain, k: typing.SupportsFloat | typing.SupportsIndex, weight: typing.SupportsFloat | typing.SupportsIndex) -> JointCost:
+    """
+    weight · ξ(q), the geometry-aware index, cut off at 2000.
+    """
+def log_manipulability_cost(chain: Chain, weight: typing.SupportsFloat | typing.SupportsIndex) -> JointCost:
+    """
+    −weight · log m(q), m no less than 1e-9.
+    """
+@typing.overload
+def manipulability_cost(sets: SingularSets, weight: typing.SupportsFloat | typing.SupportsIndex, epsilon: typing.SupportsFloat | typing.SupportsIndex) -> JointCost:
+    """
+    weight/(m(q) + ε), m in closed form.
+    """
+@typing.overload
+def manipulability_cost(chain: Chain, weight: typing.SupportsFloat | typing.SupportsIndex, epsilon: typing.SupportsFloat | typing.SupportsIndex) -> JointCost:
+    """
+    weight/(m(q) + ε), m from the Jacobian.
+    """
+def potential_cost(sets: SingularSets, weight: typing.SupportsFloat | typing.SupportsIndex, eta1: typing.SupportsFloat | typing.SupportsIndex, eta2: typing.SupportsFloat | typing.SupportsIndex) -> JointCost:
+    """
+    weight · Σ_i exp(η₁ − η₂ ψ_i(q)).
+    """
+def scaled_cost(factor: typing.SupportsFloat | typing.SupportsIndex, cost: JointCost) -> JointCost:
+    """
+    factor · cost.
+    """
+def spline_velocities(q: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Velocities (states, n) of the natural cubic spline through q (states, n), in unit time.
+    """
+def sum_of_costs(costs: collections.abc.Sequence[JointCost]) -> JointCost:
+    """
+    Σ of costs for the same joints.
+    """
+
+# ---- Cart -------------------------------------------------------------------------------------------------------------
 class CartError(Error):
     """
     No cart motion keeps out of the forbidden region. The text carries the facts.
@@ -1941,99 +2246,6 @@ def admissible_guess(flange_xy: numpy.typing.ArrayLike, start: typing.SupportsFl
     """
     A first guess (M,) of the descent that jumps past the forbidden region, on the sides of the exact law.
     """
-class DistanceField:
-    """
-    Signed distances [m] to obstacles on a regular grid, interpolated trilinearly: positive in
-    free space, negative inside. Outside the grid: continuous, growing, and no more than the
-    distance to what lies within.
-    """
-    def __init__(self, distances: numpy.typing.ArrayLike, origin: numpy.typing.ArrayLike, cell: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        """
-        distances (X, Y, Z) [m] at the nodes, the first of which is at `origin` (3,) [m] in the axes of the arm's base;
-        `cell` [m] from node to node.
-        """
-    def __repr__(self) -> str:
-        ...
-    def distance(self, points: numpy.typing.ArrayLike) -> float | numpy.typing.NDArray[numpy.float64]:
-        """
-        [m] at a point (3,), or (M,) at points (M, 3).
-        """
-    def gradient(self, points: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
-        """
-        Gradient (3,) of the distance at a point (3,), or (M, 3) at points (M, 3).
-        """
-    @property
-    def cell(self) -> float:
-        """
-        [m]
-        """
-    @property
-    def origin(self) -> numpy.typing.NDArray[numpy.float64]:
-        """
-        (3,) [m] of the first node.
-        """
-    @property
-    def shape(self) -> tuple[int, int, int]:
-        """
-        Nodes along each axis.
-        """
-class ArmSpheres:
-    """
-    An arm as S spheres fixed to its links, in the order in which joints move them, base to tip.
-
-    `sigmaik.planning.arm_spheres` makes them from a URDF, or along the links.
-    """
-    @staticmethod
-    def along_links(chain: Chain, radius: typing.SupportsFloat | typing.SupportsIndex = 0.05) -> ArmSpheres:
-        """
-        Capsules from each link's frame to the next.
-        """
-    @staticmethod
-    def from_urdf(chain: Chain, source: typing.Any, radius: typing.SupportsFloat | typing.SupportsIndex = 0.05) -> ArmSpheres:
-        """
-        Covers the boxes, cylinders and spheres of a URDF; links with meshes as along_links does.
-        """
-    def __init__(self, chain: Chain, links: collections.abc.Sequence[str], centers: numpy.typing.ArrayLike, radii: numpy.typing.ArrayLike) -> None:
-        """
-        links: the name of each sphere's link; centers (S, 3) [m] in the link's frame; radii (S,) [m].
-        """
-    def __len__(self) -> int:
-        ...
-    def __repr__(self) -> str:
-        ...
-    def centers(self, q: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
-        """
-        (S, 3) [m] in the base's axes at q (n,); (B, S, 3) at q (B, n).
-        """
-    def jacobians(self, q: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
-        """
-        ∂center/∂q (S, 3, n) at q (n,); (B, S, 3, n) at q (B, n).
-        """
-    @property
-    def chain(self) -> Chain:
-        """
-        The arm.
-        """
-    @property
-    def first_moving(self) -> int:
-        """
-        The first sphere that a joint moves; those before it belong to the base.
-        """
-    @property
-    def links(self) -> tuple[str, ...]:
-        """
-        The name of each sphere's link.
-        """
-    @property
-    def local_centers(self) -> numpy.typing.NDArray[numpy.float64]:
-        """
-        (S, 3) [m] in the link's frame.
-        """
-    @property
-    def radii(self) -> numpy.typing.NDArray[numpy.float64]:
-        """
-        (S,) [m]
-        """
 def cart_descent(lower: numpy.typing.ArrayLike, upper: numpy.typing.ArrayLike, guess: numpy.typing.ArrayLike, alpha: typing.SupportsFloat | typing.SupportsIndex, step: typing.SupportsFloat | typing.SupportsIndex, max_iterations: typing.SupportsInt | typing.SupportsIndex, until_admissible: bool) -> tuple[numpy.typing.NDArray[numpy.float64], int]:
     """
     Gradient descent (10) from a guess (M,) [m]: the law and the number of iterations.
@@ -2046,18 +2258,6 @@ def cart_motion_by_descent(flange_xy: numpy.typing.ArrayLike, start: typing.Supp
     """
     The law of the gradient descent. `sigmaik.planning.cart_motion` is what to call.
     """
-def clearance(chain: Chain, sets: SingularSets | None, t: numpy.typing.ArrayLike, q: numpy.typing.ArrayLike, *, width: typing.SupportsFloat | typing.SupportsIndex = 400.0) -> Clearance:
-    """
-    Clearance of the configurations q (M, n) at increasing times t (M,) [s].
-
-    sets: the arm's singular sets, or None.
-    width: η₂ [1/rad²]: sets of codimension above 1 count as crossed where ψ < 1/(2 width) between ends that are
-        both outside.
-    """
-def collision_cost(spheres: ArmSpheres, field: DistanceField, clearance: typing.SupportsFloat | typing.SupportsIndex = 0.05, weight: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> JointCost:
-    """
-    weight · Σ c(d) over the spheres that move, d the signed distance of their surfaces to the obstacles.
-    """
 def evaluate_cart_motion(flange_xy: numpy.typing.ArrayLike, x: numpy.typing.ArrayLike, radius: typing.SupportsFloat | typing.SupportsIndex, *, margin: typing.SupportsFloat | typing.SupportsIndex = 0.0, duration: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> CartMotion:
     """
     Any law x (M,) [m] of the cart, such as the linear one, looked at as `cart_motion` does.
@@ -2066,140 +2266,15 @@ def evaluate_cart_motion_plane(flange_xy: numpy.typing.ArrayLike, xy: numpy.typi
     """
     Any motion xy (M, 2) [m] of the cart, such as the straight one, looked at as `cart_motion_plane` does.
     """
-def evaluate_index(chain: Chain, q: numpy.typing.ArrayLike, index: str, k: numpy.typing.ArrayLike = 6.0, length_scale: typing.SupportsFloat | typing.SupportsIndex = 1.0, threads: typing.SupportsInt | typing.SupportsIndex = 1, gradients: bool = True) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
-    """
-    Values () or (B,) and, where asked for, gradients (n,) or (B, n) at q (n,) or (B, n).
-    """
 def forbidden_intervals(flange_xy: numpy.typing.ArrayLike, radius: typing.SupportsFloat | typing.SupportsIndex) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
     """
     λ−, λ+ (M,) [m]; ∞ and −∞ where nothing is forbidden.
-    """
-def geometry_aware_cost(chain: Chain, k: typing.SupportsFloat | typing.SupportsIndex, weight: typing.SupportsFloat | typing.SupportsIndex) -> JointCost:
-    """
-    weight · ξ(q), the geometry-aware index, cut off at 2000.
-    """
-def index_of_jacobian(J: numpy.typing.ArrayLike, index: str, k: numpy.typing.ArrayLike = 6.0, length_scale: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> float | numpy.typing.NDArray[numpy.float64]:
-    """
-    An index of J (m, n), or (B,) of J (B, m, n).
-    """
-def joint_limit_cost(chain: Chain, margin: typing.SupportsFloat | typing.SupportsIndex = 0.1, weight: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> JointCost:
-    """
-    weight · Σ ½x², x the way by which a joint is nearer to a limit than `margin` [rad or m], or beyond it.
-    """
-def known_singular_sets() -> tuple[str, ...]:
-    ...
-def least_squares(A: numpy.typing.ArrayLike | None = None, b: numpy.typing.ArrayLike | None = None, *, C: numpy.typing.ArrayLike | None = None, d: numpy.typing.ArrayLike | None = None, lower: numpy.typing.ArrayLike | None = None, upper: numpy.typing.ArrayLike | None = None, G: numpy.typing.ArrayLike | None = None, h: numpy.typing.ArrayLike | None = None) -> LeastSquaresSolution:
-    """
-    min |A x − b|² where C x = d, lower ≤ x ≤ upper, G x ≤ h; of these the shortest x.
-
-    A (m, n), b (m,), C (p, n), d (p,), lower, upper (n,), G (k, n), h (k,); n ≤ 24, m ≤ 32, p ≤ 8, k ≤ 32.
-    Bounds and h may be infinite.
-
-    There is always an answer: the bounds hold, then G x ≤ h as well as possible, then C x = d, then A x ≈ b.
-    """
-def load_singular_sets(name: str) -> SingularSets:
-    ...
-def log_manipulability_cost(chain: Chain, weight: typing.SupportsFloat | typing.SupportsIndex) -> JointCost:
-    """
-    −weight · log m(q), m no less than 1e-9.
-    """
-@typing.overload
-def manipulability_cost(sets: SingularSets, weight: typing.SupportsFloat | typing.SupportsIndex, epsilon: typing.SupportsFloat | typing.SupportsIndex) -> JointCost:
-    """
-    weight/(m(q) + ε), m in closed form.
-    """
-@typing.overload
-def manipulability_cost(chain: Chain, weight: typing.SupportsFloat | typing.SupportsIndex, epsilon: typing.SupportsFloat | typing.SupportsIndex) -> JointCost:
-    """
-    weight/(m(q) + ε), m from the Jacobian.
-    """
-def min_distance(spheres: ArmSpheres, field: DistanceField, q: numpy.typing.ArrayLike, threads: typing.SupportsInt | typing.SupportsIndex = 1) -> float | numpy.typing.NDArray[numpy.float64]:
-    """
-    The least signed distance [m] from a sphere that moves to the obstacles at q (n,), or (B,) at q (B, n).
     """
 def plane_cart_motion(flange_xy: numpy.typing.ArrayLike, start: numpy.typing.ArrayLike, end: numpy.typing.ArrayLike, radius: typing.SupportsFloat | typing.SupportsIndex, *, lower: numpy.typing.ArrayLike, upper: numpy.typing.ArrayLike, margin: typing.SupportsFloat | typing.SupportsIndex = 0.0, max_radius: typing.SupportsFloat | typing.SupportsIndex = ..., turn: typing.SupportsFloat | typing.SupportsIndex | None = None, duration: typing.SupportsFloat | typing.SupportsIndex = 1.0, max_speed: numpy.typing.ArrayLike = ..., max_acceleration: numpy.typing.ArrayLike = ..., at_rest: bool = False) -> PlaneCartMotion:
     """
     The motion with two axes. `sigmaik.planning.cart_motion_plane` is what to call.
     """
-def play(trajectory: Trajectory, servo: Servo, *, settle: typing.SupportsFloat | typing.SupportsIndex = 0.5) -> Playback:
-    """
-    Plays a planned motion through a servo that stands at its start, as poses with feed-forward twists, at the
-    servo's dt.
-
-    In the cycle from t to t + dt the target is the pose planned for t, and the feed-forward twist is J(q) q̇ of
-    the plan in the middle of the cycle. A cycle of constant q̇ leaves the error ½ dt² J̇ q̇, and the gains keep
-    the sum of these errors to ½ dt |J̇ q̇| / gain: micrometres at 1 kHz. The soft start costs more. The servo
-    holds its limits and treats singularities by its own rule, so it may leave the plan; its gains bring it back.
-    The servo's history goes on: call `servo.reset` before.
-
-    settle: [s] for which the last pose is held.
-
-    Raises Error where the trajectory is empty or has other joints, the servo stands elsewhere (1e-6 rad or m), or
-    settle is not finite or negative.
-    """
-def pose_error(current: typing.Any, target: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
-    """
-    [e_p; e_o] (6,) that takes `current` to `target` (4×4 poses in one frame).
-
-    e_p [m] is the difference of the origins, e_o [rad] the axis-angle vector of R_target R_currentᵀ, both in the
-    axes of that frame. Right up to and at a half turn.
-    """
-def potential_cost(sets: SingularSets, weight: typing.SupportsFloat | typing.SupportsIndex, eta1: typing.SupportsFloat | typing.SupportsIndex, eta2: typing.SupportsFloat | typing.SupportsIndex) -> JointCost:
-    """
-    weight · Σ_i exp(η₁ − η₂ ψ_i(q)).
-    """
-def reference_scale(chain: Chain, length_scale: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> float:
-    """
-    k of a chain: 6 where the largest eigenvalue of JJᵀ over its joint ranges stays below that by a tenth, else 1.1
-    times that eigenvalue, so that the sphere kI holds every ellipsoid. The same on every machine; takes a few ms.
-    """
-def rotation_exp(vector: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
-    """
-    Rotation (3, 3) about `vector` by its length [rad].
-    """
-def rotation_log(rotation: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
-    """
-    Axis times angle [rad] (3,) of a 3×3 rotation, angle in [0, π].
-    """
-def scaled_cost(factor: typing.SupportsFloat | typing.SupportsIndex, cost: JointCost) -> JointCost:
-    """
-    factor · cost.
-    """
-def rules() -> tuple[type[Method], ...]:
-    """
-    The class of every rule, in the order of lists and tables.
-    """
-def self_collision_cost(spheres: ArmSpheres, pairs: numpy.typing.ArrayLike | None = None, clearance: typing.SupportsFloat | typing.SupportsIndex = 0.02, weight: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> JointCost:
-    """
-    weight · Σ c(d) over pairs of spheres (P, 2), by default `self_collision_pairs(spheres, clearance)`;
-    d the distance of their surfaces, c(d) as in `collision_cost`.
-    """
-def self_collision_pairs(spheres: ArmSpheres, clearance: typing.SupportsFloat | typing.SupportsIndex = 0.02, most_contacts: typing.SupportsFloat | typing.SupportsIndex = 0.1) -> numpy.typing.NDArray[numpy.int32]:
-    """
-    (P, 2) spheres of links that are not neighbours, but for those nearer than `clearance` [m] at more than a share
-    `most_contacts` (0 … 1) of a thousand configurations within the joint limits. The same on every machine; takes some
-    ms.
-    """
-def singular_sets_of(chain: Chain) -> SingularSets | None:
-    ...
-def solve_batch(method: Method | str, J: numpy.typing.ArrayLike, twist: numpy.typing.ArrayLike, length_scale: typing.SupportsFloat | typing.SupportsIndex = 1.0, threads: typing.SupportsInt | typing.SupportsIndex = 1) -> numpy.typing.NDArray[numpy.float64]:
-    """
-    Joint velocities (B, n) for B independent problems, J (B, m, n) and twist (B, m), without the GIL.
-
-    Each is solved as by a fresh VelocitySolver, so order and number of threads do not change the answers.
-    Raises Error where a shape is wrong or an entry is not finite.
-    """
-def spline_velocities(q: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
-    """
-    Velocities (states, n) of the natural cubic spline through q (states, n), in unit time.
-    """
-def sum_of_costs(costs: collections.abc.Sequence[JointCost]) -> JointCost:
-    """
-    Σ of costs for the same joints.
-    """
 def taut_string(at: numpy.typing.ArrayLike, lower: numpy.typing.ArrayLike, upper: numpy.typing.ArrayLike) -> tuple[numpy.typing.NDArray[numpy.float64], list[int]]:
     """
     The shortest string x (N,) through lower ≤ x ≤ upper over increasing `at`, and the indices of its corners.
     """
-DEFAULT_SCALE: float = 6.0
-__version__: str
