@@ -12,6 +12,8 @@ sed -zEi '
   s/\n    ([A-Z_]+): typing\.ClassVar\[\w+\]/\n    \1 = .../g
   s/(\n    [A-Z_]+ = \.\.\.\n)((    @\w+\n)*    def [^\n]*\n(        [^\n]*\n)+)+/\1/g
   s/\n__version__: str = [^\n]*/\n__version__: str/
+  s/__hash__: typing\.ClassVar\[None\] = None\n/__hash__: typing.ClassVar[None] = None  # type: ignore[assignment]\n/g
+  s/\(self, arg0: tuple\)/(self, arg0: tuple[typing.Any, ...])/g
   s/ +\n/\n/g' "$out/sigmaik/_core.pyi"
 # Both files in sections by topic: the order in which branches were merged makes no difference.
 .venv/bin/python tools/stub_sections.py "$out/sigmaik/_core.pyi" python/sigmaik/_core.pyi

@@ -11,6 +11,7 @@ import os
 import sys
 import warnings
 from collections.abc import Sequence
+from typing import TextIO
 
 import sigmaik as sk
 
@@ -75,12 +76,19 @@ def _fill(parser: argparse.ArgumentParser, name: str) -> None:
     parser.set_defaults(call=command.run)
 
 
-def _show_warning(message: Warning | str, category: type[Warning], *place: object) -> None:
+def _show_warning(
+    message: Warning | str,
+    category: type[Warning],
+    filename: str,
+    lineno: int,
+    file: TextIO | None = None,
+    line: str | None = None,
+) -> None:
     """A warning of a model is for the user, not about a line of code."""
     if issubclass(category, sk.ModelWarning):
         print(f"sigmaik: warning: {message}", file=sys.stderr)
     else:
-        _python_shows(message, category, *place)  # type: ignore[arg-type]
+        _python_shows(message, category, filename, lineno, file, line)
 
 
 def _one_line(error: Exception) -> str:

@@ -390,7 +390,8 @@ class Page:
         if ticks % round(DRAWN / GAUGES):
             return
         sigma = sample["singular_values"]
-        sigma, singular = sigma[np.isfinite(sigma)], int(sample["singular"])
+        sigma = sigma[np.isfinite(sigma)]
+        singular: int | None = int(sample["singular"])
         if not len(sigma):  # the arm holds: no rule has run
             jacobian = session.chain.jacobian(sample["q"])
             sigma, singular = task_singular_values(jacobian, sample["pose"][:3, :3], settings), None

@@ -48,8 +48,7 @@ def task_singular_values(jacobian: Array, rotation: Array, settings: Settings) -
     if settings.frame == "tool":
         rows[:3], rows[3:] = rotation.T @ rows[:3], rotation.T @ rows[3:]
     rows[3:] *= settings.length_scale
-    sigma: Array = np.linalg.svd(rows[list(settings.mask)], compute_uv=False)
-    return sigma
+    return np.asarray(np.linalg.svd(rows[list(settings.mask)], compute_uv=False), np.float64)
 
 
 class Scene:

@@ -128,9 +128,11 @@ class _Scaled:
         self._factor, self._cost = factor, cost
 
     def value(self, q: Array) -> Array:
-        return np.multiply(self._factor, self._cost.value(q))
+        values: Array = np.multiply(self._factor, self._cost.value(q))
+        return values
 
 
 class _ScaledWithGradient(_Scaled):
     def gradient(self, q: Array) -> Array:
-        return np.multiply(self._factor, self._cost.gradient(q))
+        gradients: Array = np.multiply(self._factor, self._cost.gradient(q))
+        return gradients
