@@ -80,9 +80,9 @@ TEST_CASE("an application's rule answers as the library's, for every size, with 
       }
     };
     CAPTURE(repeat);
-    compare(OwnDls{damping}, DampedLeastSquares{damping}, 1e-14);
-    compare(OwnJParse{jparse}, jparse, 1e-15);
-    compare(OwnSdls{sdls}, sdls, 1e-15);
+    compare(CustomRule(OwnDls{damping}), DampedLeastSquares{damping}, 1e-14);
+    compare(CustomRule(OwnJParse{jparse}), jparse, 1e-15);
+    compare(CustomRule(OwnSdls{sdls}), sdls, 1e-15);
   }
 }
 
@@ -113,11 +113,13 @@ TEST_CASE("an application's rule is checked when a solver, a servo or a change o
       const VelocitySolver solver(method);
       FAIL("accepted");
     } catch (const Error& error) {
+      CAPTURE(std::string(error.what()));
       CHECK(std::string(error.what()).find(what) != std::string::npos);
     }
   };
   refuses(OwnDls{0.0}, "OwnDls: lambda must be above 0");
-  refuses(OwnJParse{JParse{2.0}}, "OwnJParse: gamma = 2 must be finite and above 0 and at most 1");
+  // CustomRule by name: a rule that derives from one of the library would be taken as that one.
+  refuses(CustomRule(OwnJParse{JParse{2.0}}), "OwnJParse: gamma = 2 must be finite and above 0 and at most 1");
   for (const double bad : {0.0, -0.1, 1.1}) refuses(NoThreshold{bad}, "NoThreshold: relative_threshold() = ");
   VelocitySolver solver(OwnDls{});
   CHECK_THROWS_AS(solver.set_method(OwnDls{-1.0}), Error);
