@@ -1,6 +1,6 @@
 """Obstacles, arms as spheres, and what their nearness costs."""
 
-import builtins
+import importlib.util
 import math
 import threading
 
@@ -161,16 +161,12 @@ def test_occupancy_grid():
             P.Obstacles.from_occupancy(bad, (0, 0, 0), 0.1)
 
 
-def test_scipy_missing_names_the_extra(monkeypatch):
-    real = builtins.__import__
-
-    def without(name, *args, **kwargs):
-        if name.startswith("scipy"):
-            raise ImportError(name)
-        return real(name, *args, **kwargs)
-
-    monkeypatch.setattr(builtins, "__import__", without)
-    with pytest.raises(sk.Error, match=r"sigmaik\[obstacles\]"):
+def test_scipy_missing_names_the_command(monkeypatch):
+    real = importlib.util.find_spec
+    monkeypatch.setattr(
+        importlib.util, "find_spec", lambda name, *package: None if name == "scipy" else real(name, *package)
+    )
+    with pytest.raises(sk.Error, match="pip install scipy"):
         P.Obstacles.from_occupancy(np.eye(3)[:, :, None] * [1, 0], (0, 0, 0), 0.1)
     P.Obstacles([P.Sphere(0.1, (0, 0, 0))])  # needs none
 
