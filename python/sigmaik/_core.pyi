@@ -8,7 +8,6 @@ import numpy
 import numpy.typing
 import os
 import pathlib
-from sigmaik import ModelWarning
 import sigmaik.planning.status
 import typing
 __all__: list[str] = ['AdaptiveDampedLeastSquares', 'AnalyticBranch', 'AnalyticIk', 'ArgumentError', 'ArmSpheres', 'CartError', 'CartMeasures', 'CartMotion', 'CartRegion', 'Chain', 'Clearance', 'ComputedTorque', 'ComputedTorqueStep', 'ConstrainedIk', 'ConstrainedIkStep', 'Crossing', 'DEFAULT_SCALE', 'DampedLeastSquares', 'DistanceField', 'Dynamics', 'Error', 'Inertia', 'JParse', 'JacobianProjection', 'JacobianSafety', 'JacobianSafetyProjection', 'JointCost', 'JointLimits', 'LeastSquaresSolution', 'LoopCommand', 'LoopStatistics', 'Method', 'ModelWarning', 'PlaneCartMotion', 'Playback', 'PseudoInverse', 'SampleCounts', 'SampleStatus', 'Segment', 'SelectivelyDampedLeastSquares', 'Servo', 'ServoLoop', 'ServoStep', 'SingularSets', 'Solution', 'Spectrum', 'Status', 'StreamStatus', 'SupportPlanner', 'SupportStates', 'Target', 'TargetStream', 'TimeOptimal', 'TimeOptimalResult', 'Trajectory', 'VelocitySolver', 'admissible_guess', 'cart_descent', 'cart_motion', 'cart_motion_by_descent', 'clearance', 'collision_cost', 'evaluate_cart_motion', 'evaluate_cart_motion_plane', 'evaluate_index', 'forbidden_intervals', 'geometry_aware_cost', 'index_of_jacobian', 'joint_limit_cost', 'known_singular_sets', 'least_squares', 'load_singular_sets', 'log_manipulability_cost', 'manipulability_cost', 'min_distance', 'plane_cart_motion', 'play', 'pose_error', 'potential_cost', 'reference_scale', 'rotation_exp', 'rotation_log', 'rules', 'scaled_cost', 'self_collision_cost', 'self_collision_pairs', 'singular_sets_of', 'solve_batch', 'spline_velocities', 'sum_of_costs', 'taut_string']
@@ -23,6 +22,10 @@ class Error(ValueError):
 class ArgumentError(Error, TypeError):
     """
     An argument that a call does not have, or lacks, or that is of a wrong type.
+    """
+class ModelWarning(UserWarning):
+    """
+    What set-up finds odd in a model or a start, and takes all the same.
     """
 class Status(enum.IntEnum):
     """
@@ -1455,7 +1458,7 @@ class Crossing:
     A motion goes through a singular set here, or so near to it that the set's potential does not
     tell the difference.
     """
-    __hash__: typing.ClassVar[None] = None
+    __hash__: typing.ClassVar[None] = None  # type: ignore[assignment]
     def __eq__(self, other: typing.Any) -> bool:
         ...
     def __getstate__(self) -> tuple[str, float, list[float], float, bool]:
@@ -1464,7 +1467,7 @@ class Crossing:
         ...
     def __repr__(self) -> str:
         ...
-    def __setstate__(self, arg0: tuple) -> None:
+    def __setstate__(self, arg0: tuple[typing.Any, ...]) -> None:
         ...
     @property
     def avoidable(self) -> bool:
@@ -1501,7 +1504,7 @@ class Clearance:
         ...
     def __repr__(self) -> str:
         ...
-    def __setstate__(self, arg0: tuple) -> None:
+    def __setstate__(self, arg0: tuple[typing.Any, ...]) -> None:
         ...
     @property
     def avoidable(self) -> tuple[Crossing, ...]:
@@ -1582,7 +1585,7 @@ class Trajectory:
         ...
     def __repr__(self) -> str:
         ...
-    def __setstate__(self, arg0: tuple) -> None:
+    def __setstate__(self, arg0: tuple[typing.Any, ...]) -> None:
         ...
     def _save_text(self, file: str) -> None:
         ...
