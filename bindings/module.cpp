@@ -13,8 +13,8 @@ void bind_status(py::module_& m) {
       .attr("__doc__") = "An argument that a call does not have, or lacks, or that is of a wrong type.";
   // Made by hand: register_exception() makes exceptions that C++ throws, and a warning is none.
   m.attr("ModelWarning") = py::reinterpret_steal<py::object>(PyErr_NewExceptionWithDoc(
-      "sigmaik._core.ModelWarning", "What set-up finds odd in a model or a start, and takes all the same.", PyExc_UserWarning,
-      nullptr));
+      "sigmaik._core.ModelWarning", "What set-up finds odd in a model or a start, and takes all the same.",
+      PyExc_UserWarning, nullptr));
   py::native_enum<Status>(m, "Status", "enum.IntEnum",
                           "What a call did, ordered from the best to the worst. Degraded is not failed: everything "
                           "below BAD_INPUT is finite, inside the stated bound, and may be sent to the arm.")
