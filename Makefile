@@ -19,7 +19,7 @@ help:  ## this list
 demo: .venv/.demo .venv/.package  ## a 7-joint arm driven beyond its reach by every method: a plot and its numbers
 	$(BIN)/sigmaik reach --robot ufactory_xarm7 --path extended-line --method all --out build/demo
 
-docs: .venv/.docs .venv/.test .venv/.package  ## the documentation site, in build/docs/html (part of `make test`)
+docs: .venv/.docs .venv/.test .venv/.package  ## the documentation site, in build/docs/html
 	@tools/setup_system.sh $(PYTHON) doxygen
 	mkdir -p build/docs
 	doxygen docs/Doxyfile
@@ -34,7 +34,6 @@ test: lint build .venv/.test .venv/.package  ## everything: lint, install, stubs
 	tools/stubs.sh --check
 	ctest --test-dir build/release --output-on-failure
 	$(BIN)/python -m pytest
-	$(MAKE) docs
 	$(MAKE) test-browser
 
 test-browser: .venv/.test .venv/.package  ## the page of `sigmaik teleop` in Chromium, without a screen (part of `make test`)
