@@ -19,7 +19,7 @@ help:  ## this list
 demo: .venv/.demo .venv/.package  ## a 7-joint arm driven beyond its reach by every method: a plot and its numbers
 	$(BIN)/sigmaik reach --robot ufactory_xarm7 --path extended-line --method all --out build/demo
 
-docs: .venv/.docs .venv/.test .venv/.package  ## the documentation site, in build/docs/html
+docs: .venv/.docs .venv/.test .venv/.package  ## the documentation site, in build/docs/html (part of `make test`)
 	@tools/setup_system.sh $(PYTHON) doxygen
 	mkdir -p build/docs
 	doxygen docs/Doxyfile
@@ -29,12 +29,12 @@ docs: .venv/.docs .venv/.test .venv/.package  ## the documentation site, in buil
 lint: .venv/.test  ## format, style, types, spelling, and what the repository says of itself
 	tools/lint.sh
 
-test: lint build .venv/.test .venv/.package  ## everything: lint, install, stubs, C++ tests, Python tests
+test: lint build .venv/.test .venv/.package  ## everything: lint, install, stubs, C++ tests, Python tests, docs
 	tools/check_install.sh build/release
 	tools/stubs.sh --check
-	ctest --test-dir build/release --output-on-failure
-	$(BIN)/python -m pytest
-	$(MAKE) test-browser
+	ctest --test-dir build/release --output-on-failure -j $$(nproc)
+	$(BIN)/python -m pytest -n $$(nproc) --dist worksteal
+	$(MAKE) test-browser docs
 
 test-browser: .venv/.test .venv/.package  ## the page of `sigmaik teleop` in Chromium, without a screen (part of `make test`)
 	@tools/setup_system.sh $(PYTHON) chromium

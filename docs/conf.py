@@ -85,7 +85,9 @@ def _signature(app, what, name, obj, options, signature: str | None, returned: s
 
 def _says_more(record: logging.LogRecord) -> bool:
     """False for the duplicates that are none: a namespace, which every header opens again."""
-    return not re.search(r"Duplicate C\+\+ declaration.*cpp:type:: (sigmaik|planning)'", record.getMessage(), re.DOTALL)
+    return not re.search(
+        r"Duplicate C\+\+ declaration.*cpp:type:: (sigmaik|planning|costs)'", record.getMessage(), re.DOTALL
+    )
 
 
 for _logger in ("sphinx.sphinx.domains.cpp", "sphinx.sphinx.domains.cpp._symbol"):

@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "message.hpp"
+#include "numbers.hpp"
 #include "rigid_body.hpp"
 
 namespace sigmaik {
@@ -13,7 +14,7 @@ namespace {
 
 using detail::require;
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+using detail::kInfinity;
 // A larger number is a mistake or has a wrong unit.
 constexpr double kLargestOffset = 1e6;  // m
 constexpr double kLargestLimit = 1e9;   // rad, rad/s, …; infinity means "no limit"

@@ -8,13 +8,14 @@
 
 #include "length.hpp"
 #include "message.hpp"
+#include "numbers.hpp"
 
 namespace sigmaik {
 namespace {
 
 using detail::require;
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+using detail::kInfinity;
 constexpr double kMet = 1e-9;    // [m, rad] a smaller error counts as none
 constexpr double kAgree = 0.01;  // velocities that differ by less than this part of a joint's bounds are the same
 

@@ -1,7 +1,6 @@
 #include <sigmaik/indices.hpp>
 
 #include <cmath>
-#include <limits>
 
 #include <Eigen/Eigenvalues>
 
@@ -9,13 +8,14 @@
 
 #include "aligned.hpp"
 #include "message.hpp"
+#include "numbers.hpp"
 #include "quasi_random.hpp"
 #include "ranges.hpp"
 
 namespace sigmaik {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+using detail::kInfinity;
 // A singular value below this part of the largest one counts as zero. Rounding turns an exact zero into up to 4e-15.
 constexpr double kRounding = 1e-14;
 

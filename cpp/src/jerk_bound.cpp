@@ -1,14 +1,13 @@
 #include "jerk_bound.hpp"
 
 #include <cmath>
-#include <limits>
 
 #include "jerk_stop.hpp"
+#include "numbers.hpp"
 
 namespace sigmaik::detail {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr int kMostEvaluations = 16;
 
 double square(double x) noexcept { return x * x; }

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 
 #include "active_set.hpp"
 #include "finite.hpp"
+#include "numbers.hpp"
 
 namespace sigmaik {
 namespace {
@@ -14,7 +14,7 @@ namespace {
 using detail::ActiveSet;
 using detail::ActiveSetProblem;
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+using detail::kInfinity;
 
 static_assert(detail::kActiveSetRows == kMaxObjectives + kMaxEqualities + kMaxInequalities);
 

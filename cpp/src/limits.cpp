@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include "finite.hpp"
 #include "jerk_bound.hpp"
 #include "jerk_stop.hpp"
 #include "message.hpp"
+#include "numbers.hpp"
 
 namespace sigmaik {
 namespace {
@@ -17,7 +17,7 @@ namespace {
 using detail::kLimitTolerance;
 using detail::require;
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+using detail::kInfinity;
 // Braking is planned this much weaker than it may be, so that the plan can make up for rounding on the way.
 constexpr double kBrakingReserve = 1e-10;
 constexpr double kSnap = 1e-12;  // [1 + rad or m] rounding of positions as they add up

@@ -5,11 +5,11 @@
 // formats and crashes on "%s".
 
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include <sigmaik/chain.hpp>
 
+#include "numbers.hpp"
 #include "urdf_xml.hpp"
 #include "urdfdom.hpp"
 
@@ -27,7 +27,7 @@ using detail::xml::Tree;
 using detail::xml::TreeJoint;
 using detail::xml::XMLElement;
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+using detail::kInfinity;
 
 std::optional<Inertia> inertia(const std::string& link, const XMLElement& element) {
   const std::string owner = "link '" + link + "'";

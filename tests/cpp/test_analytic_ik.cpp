@@ -10,7 +10,6 @@
 #include <vector>
 
 #include <Eigen/LU>
-#include <Eigen/SVD>
 
 #include <sigmaik/analytic_ik.hpp>
 #include <sigmaik/error.hpp>
@@ -18,6 +17,7 @@
 #include <sigmaik/pose.hpp>
 
 #include "heap.hpp"
+#include "oracles.hpp"
 #include "random.hpp"
 
 namespace {
@@ -46,7 +46,7 @@ static_assert(noexcept(std::declval<const AnalyticIk&>().solve(std::declval<cons
 static_assert(noexcept(std::declval<const AnalyticIk&>().nearest(std::declval<const Pose&>(),
                                                                  std::declval<const sigmaik::JointRef&>())));
 
-Chain load(const std::string& name) { return Chain::from_urdf(std::string(SIGMAIK_ROBOTS_DIR) + "/" + name + ".urdf"); }
+Chain load(const std::string& name) { return Chain::from_urdf(SIGMAIK_ROBOTS_DIR "/" + name + ".urdf"); }
 
 // ---- Arms -----------------------------------------------------------------------------------------------------------
 
@@ -196,7 +196,7 @@ Vector3d factors(const Chain& chain, const SixJoints& q) {
     a.middleRows<3>(3 * i) << 0.0, -w[2], w[1], w[2], 0.0, -w[0], -w[1], w[0], 0.0;
     b.segment<3>(3 * i) = -velocity(3 + i);
   }
-  const Vector3d centre = a.colPivHouseholderQr().solve(b);
+  const Vector3d centre = test::least_squares(a, b);
   const auto at_centre = [&](int i) -> Vector3d { return velocity(i) + axis(i).cross(centre); };
   return {at_centre(0).dot(axis(1)), at_centre(1).cross(at_centre(2)).dot(axis(1)),
           axis(3).cross(axis(4)).dot(axis(5))};
@@ -366,9 +366,9 @@ TEST_CASE("a rotation in single precision is taken as the nearest one") {
     rough.matrix() = rough.matrix().cast<float>().cast<double>();
     const AnalyticSolutions s = ik.solve(rough);
     CHECK(nearest_branch(s, q) < 1e-3);
-    Eigen::JacobiSVD<Matrix3d> svd(rough.linear(), Eigen::ComputeFullU | Eigen::ComputeFullV);
+    const test::Svd svd = test::svd(rough.linear());
     Pose exact = rough;
-    exact.linear() = svd.matrixU() * svd.matrixV().transpose();
+    exact.linear() = svd.u * svd.v.transpose();
     for (const AnalyticBranch& branch : s) CHECK(misses(chain, branch.q, exact) < 1e-12);
   }
 }

@@ -8,11 +8,11 @@
 #include <map>
 #include <string>
 
-#include <Eigen/QR>
 #include <sigmaik/constrained_ik.hpp>
 #include <sigmaik/error.hpp>
 #include <sigmaik/pose.hpp>
 
+#include "oracles.hpp"
 #include "random.hpp"
 
 using namespace sigmaik;
@@ -60,13 +60,11 @@ MatrixXd rows_of(const std::array<bool, 6>& mask, bool value, const MatrixXd& m)
 
 // min |A x − b| where C x = d, by the null space of C.
 VectorXd constrained(const MatrixXd& A, const VectorXd& b, const MatrixXd& C, const VectorXd& d) {
-  if (C.rows() == 0) return A.completeOrthogonalDecomposition().solve(b);
-  const auto orthogonal = C.transpose().fullPivHouseholderQr();
-  const MatrixXd Q = orthogonal.matrixQ();
-  const MatrixXd Z = Q.rightCols(C.cols() - orthogonal.rank());
-  const VectorXd x = C.completeOrthogonalDecomposition().solve(d);
+  if (C.rows() == 0) return test::least_squares(A, b);
+  const MatrixXd Z = test::null_space(C);
+  const VectorXd x = test::least_squares(C, d);
   if (A.rows() == 0 || Z.cols() == 0) return x;
-  return x + Z * MatrixXd(A * Z).completeOrthogonalDecomposition().solve(b - A * x);
+  return x + Z * test::least_squares(A * Z, b - A * x);
 }
 
 }  // namespace
@@ -135,7 +133,7 @@ TEST_CASE("one linearisation is equation (25) with (26), whatever is exact, weig
     if (scaled && (x[n] < 1e-6 || x[n] > 1.0 - 1e-6)) continue;  // its bounds are another test's
     const auto conditioned = [](const MatrixXd& m, double least) {
       if (m.rows() == 0) return true;
-      const VectorXd sigma = Eigen::JacobiSVD<MatrixXd>(m).singularValues();
+      const VectorXd sigma = test::singular_values(m);
       return sigma.minCoeff() > least * sigma.maxCoeff();
     };
     const MatrixXd all = (MatrixXd(A.rows() + C.rows(), unknowns) << A, C).finished();

@@ -4,10 +4,9 @@
 
 #include <vector>
 
-#include <Eigen/SVD>
-
 #include <sigmaik/servo.hpp>
 
+#include "oracles.hpp"
 #include "random.hpp"
 
 using namespace sigmaik;
@@ -84,16 +83,16 @@ TEST_CASE("a cycle's singular directions are the rule's, for every method, task 
     }
 
     // And they span what another decomposition says, where the singular values are well apart.
-    const Eigen::JacobiSVD<Eigen::MatrixXd> svd(rows * state.jacobian, Eigen::ComputeFullU);
+    const test::Svd svd = test::svd(rows * state.jacobian);
     Eigen::MatrixXd span(rows.rows(), 0);
     double gap = 1.0;
-    const auto sigma = [&](Eigen::Index i) { return i < svd.singularValues().size() ? svd.singularValues()[i] : 0.0; };
+    const auto sigma = [&](Eigen::Index i) { return i < svd.sigma.size() ? svd.sigma[i] : 0.0; };
     for (Eigen::Index i = 0; i < rows.rows(); ++i) {
       const bool singular = (step.singular >> i & 1u) != 0;
       if (i > 0 && singular != ((step.singular >> (i - 1) & 1u) != 0)) gap = std::min(gap, sigma(i - 1) - sigma(i));
       if (!singular) continue;
       span.conservativeResize(rows.rows(), span.cols() + 1);
-      span.col(span.cols() - 1) = svd.matrixU().col(i);
+      span.col(span.cols() - 1) = svd.u.col(i);
     }
     if (gap > 1e-6 * sigma(0)) CHECK((u * u.transpose() - span * span.transpose()).norm() < 1e-8);
   }

@@ -1,13 +1,11 @@
 #include <doctest/doctest.h>
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/SVD>
-
 #include <sigmaik/error.hpp>
 #include <sigmaik/indices.hpp>
 
 #include "arms.hpp"
 #include "heap.hpp"
+#include "oracles.hpp"
 #include "random.hpp"
 
 using namespace sigmaik;
@@ -21,7 +19,7 @@ constexpr Index kAll[] = {Index::Manipulability, Index::ConditionNumber, Index::
 
 // ‖log(Σ^{-1/2} M Σ^{-1/2})‖_F² by generalised eigenvalues.
 double distance(const MatrixXd& m, const MatrixXd& sigma) {
-  return Eigen::GeneralizedSelfAdjointEigenSolver<MatrixXd>(m, sigma).eigenvalues().array().log().square().sum();
+  return test::generalised_eigenvalues(m, sigma).array().log().square().sum();
 }
 
 TaskMatrix positive(Random& random, int m) {
@@ -36,7 +34,7 @@ TEST_CASE("values are those of the definitions") {
   for (int trial = 0; trial < 3000; ++trial) {
     const int m = random.integer(1, 6), n = random.integer(m, 16);
     const MatrixXd j = random.decades(-1, 1) * random.matrix(m, n);
-    const VectorXd sigma = Eigen::JacobiSVD<MatrixXd>(j).singularValues();
+    const VectorXd sigma = test::singular_values(j);
     const MatrixXd gram = j * j.transpose();
     CHECK(manipulability(j) == doctest::Approx(std::sqrt(gram.determinant())).epsilon(1e-8));
     CHECK(manipulability(j) == doctest::Approx(sigma.prod()).epsilon(1e-12));
@@ -52,10 +50,10 @@ TEST_CASE("values are those of the definitions") {
     TaskMatrix moved = a * given * a.transpose();
     moved = 0.5 * (moved + moved.transpose()).eval();
     CHECK(IndexFunction(Index::GeometryAware, {.sigma = moved}).value(a * j) == doctest::Approx(xi).epsilon(1e-6));
-    const MatrixXd inverse = j.completeOrthogonalDecomposition().pseudoInverse().transpose();
+    const MatrixXd inverse = test::pseudo_inverse(j).transpose();
     CHECK(geometry_aware(inverse, 1.0) == doctest::Approx(geometry_aware(j, 1.0)).epsilon(1e-8));
     // Nothing at Σ itself.
-    const MatrixXd root = given.llt().matrixL();
+    const MatrixXd root = test::cholesky(given);
     CHECK(IndexFunction(Index::GeometryAware, {.sigma = given}).value(root) < 1e-18);
   }
 }
@@ -120,7 +118,7 @@ TEST_CASE("gradients") {
       update(chain, q, state);
       Jacobian weighted = state.jacobian;
       weighted.bottomRows<3>() *= options.length_scale;
-      const VectorXd sigma = Eigen::JacobiSVD<MatrixXd>(weighted).singularValues();
+      const VectorXd sigma = test::singular_values(MatrixXd(weighted));
       // σ_1 and σ_6 have derivatives where they are simple, and differences tell them where they are not too curved.
       if (sigma[5] < 1e-2 * sigma[0]) continue;
       const bool simple = sigma[4] - sigma[5] > 1e-2 * sigma[0] && sigma[0] - sigma[1] > 1e-2 * sigma[0];
@@ -175,7 +173,7 @@ TEST_CASE("base and threads do not matter, units do as they should") {
       }
       ChainState state;
       update(arm, x, state);
-      largest = std::max(largest, std::pow(Eigen::JacobiSVD<MatrixXd>(state.jacobian).singularValues()[0], 2));
+      largest = std::max(largest, std::pow(test::singular_values(MatrixXd(state.jacobian))[0], 2));
     }
     CAPTURE(name);
     CHECK(k >= largest);

@@ -7,10 +7,10 @@
 #include <limits>
 #include <vector>
 
-#include <Eigen/QR>
 #include <sigmaik/least_squares.hpp>
 
 #include "heap.hpp"
+#include "oracles.hpp"
 #include "random.hpp"
 
 using namespace sigmaik;
@@ -48,7 +48,7 @@ double distance_to_cone(const MatrixXd& E, const VectorXd& f) {
       }
       MatrixXd part(E.rows(), static_cast<Eigen::Index>(set.size()));
       for (std::size_t k = 0; k < set.size(); ++k) part.col(static_cast<Eigen::Index>(k)) = E.col(set[k]);
-      const VectorXd z = part.completeOrthogonalDecomposition().solve(f);
+      const VectorXd z = test::least_squares(part, f);
       double step = 1.0;
       for (std::size_t k = 0; k < set.size(); ++k) {
         const double zk = z[static_cast<Eigen::Index>(k)];

@@ -3,8 +3,6 @@
 #include <functional>
 #include <limits>
 
-#include <Eigen/Eigenvalues>
-
 #include <sigmaik/error.hpp>
 #include <sigmaik/kinematics.hpp>
 #include <sigmaik/planning/collision_costs.hpp>
@@ -12,6 +10,7 @@
 
 #include "arms.hpp"
 #include "heap.hpp"
+#include "oracles.hpp"
 #include "random.hpp"
 
 using namespace sigmaik;
@@ -244,7 +243,7 @@ TEST_CASE("a URDF's shapes are covered whole, and not by much more") {
   }
   for (const auto& [key, arm] : test::arms()) {
     const std::string& name = key;
-    const ArmSpheres found = ArmSpheres::from_urdf(arm, std::string(SIGMAIK_ROBOTS_DIR) + "/" + name + ".urdf");
+    const ArmSpheres found = ArmSpheres::from_urdf(arm, SIGMAIK_ROBOTS_DIR "/" + name + ".urdf");
     CAPTURE(name);
     CHECK(found.size() >= 20);
     CHECK(found.size() <= 90);
@@ -312,7 +311,7 @@ TEST_CASE("collision cost: CHOMP's hinge of every moving sphere, with its gradie
       REQUIRE((g - 3.0 * slope).cwiseAbs().maxCoeff() < 1e-11);
       REQUIRE((g - g2).cwiseAbs().maxCoeff() < 1e-12);
       REQUIRE((h - 3.0 * curvature).cwiseAbs().maxCoeff() < 1e-9);
-      REQUIRE(Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(h).eigenvalues()[0] > -1e-9);
+      REQUIRE(test::eigenvalues(h)[0] > -1e-9);
       REQUIRE(min_distance(spheres, field, q) == doctest::Approx(least).epsilon(1e-12));
       if (!smooth) continue;
       ++checked;
@@ -362,7 +361,7 @@ TEST_CASE("self-collision cost") {
   for (const auto& [key, arm] : test::arms()) {
     const std::string& name = key;
     CAPTURE(name);
-    const ArmSpheres spheres = ArmSpheres::from_urdf(arm, std::string(SIGMAIK_ROBOTS_DIR) + "/" + name + ".urdf");
+    const ArmSpheres spheres = ArmSpheres::from_urdf(arm, SIGMAIK_ROBOTS_DIR "/" + name + ".urdf");
     const std::vector<SpherePair> pairs = self_collision_pairs(spheres);
     CHECK(pairs == self_collision_pairs(spheres));
     CHECK(pairs.size() > 100);

@@ -9,8 +9,6 @@
 #include <limits>
 #include <map>
 
-#include <Eigen/SVD>
-
 #include <sigmaik/constrained_ik.hpp>
 #include <sigmaik/least_squares.hpp>
 #include <sigmaik/pose.hpp>
@@ -19,6 +17,7 @@
 #include "arms.hpp"
 #include "heap.hpp"
 #include "methods.hpp"
+#include "oracles.hpp"
 #include "random.hpp"
 
 namespace {
@@ -39,10 +38,8 @@ Jacobian jacobian(const Chain& chain, const JointVector& q) {
   return state.jacobian;
 }
 
-VectorXd singular_values(const MatrixXd& m) { return Eigen::JacobiSVD<MatrixXd>(m).singularValues(); }
-
 double ratio(const MatrixXd& m) {
-  const VectorXd s = singular_values(m);
+  const VectorXd s = test::singular_values(m);
   return s[s.size() - 1] / s[0];
 }
 
@@ -156,8 +153,8 @@ TEST_CASE("redistribution: the bounded least squares that it says, by its optima
       ++cases;
 
       // min |J x|² + λ² |x|², λ = σ_max/100, and once more from there: as the stacked problem that it is.
-      const Eigen::JacobiSVD<MatrixXd> svd(J);
-      const double largest = svd.singularValues()[0], lambda = 1e-2 * largest;
+      const VectorXd sigma = test::singular_values(J);
+      const double largest = sigma[0], lambda = 1e-2 * largest;
       LeastSquaresProblem problem;
       problem.A = (MatrixXd(6 + n, n) << J, lambda * MatrixXd::Identity(n, n)).finished();
       problem.b = VectorXd::Zero(6 + n);
@@ -196,7 +193,7 @@ TEST_CASE("redundant arms: the other joints take over all of it where they can")
     for (int repeat = 0; repeat < 60; ++repeat) {
       const JointVector q = regular(random, shipped, 0.1);
       const MatrixXd J = jacobian(shipped, q);
-      const VectorXd null = Eigen::JacobiSVD<MatrixXd>(J, Eigen::ComputeFullV).matrixV().col(6);
+      const VectorXd null = test::svd(J).v.col(6);
       const Twist twist = 0.3 * random.unit(6);
       const JParse method{0.05};
       const VectorXd asked = rule(shipped, method, q, twist);
@@ -602,7 +599,7 @@ TEST_CASE("no jumps where the joints held change: as commands move, and as the a
       const bool even = repeat % 5 != 4 && repeat % 4 != 2;
       const JointVector q = inside(random, chain), way = 0.5 * random.unit(chain.dof());
       const Twist from = random.unit(6), to = random.unit(6);
-      const double sigma = singular_values(jacobian(chain, q))[0];
+      const double sigma = test::singular_values(MatrixXd(jacobian(chain, q)))[0];
       const auto command = [&](double t) -> Twist { return from + t * (to - from); };
       const auto at_command = [&](double t) -> VectorXd { return once(chain, JParse{}, options, q, command(t)).qdot; };
       VectorXd last = at_command(0.0), last_rule = rule(chain, JParse{}, q, from), last_state = last;

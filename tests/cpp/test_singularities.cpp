@@ -1,13 +1,12 @@
 #include <doctest/doctest.h>
 
-#include <Eigen/SVD>
-
 #include <sigmaik/error.hpp>
 #include <sigmaik/kinematics.hpp>
 #include <sigmaik/singularities.hpp>
 
 #include "arms.hpp"
 #include "heap.hpp"
+#include "oracles.hpp"
 #include "random.hpp"
 
 using namespace sigmaik;
@@ -22,7 +21,7 @@ JointVector anywhere(Random& random, int n) {
 double sigma_ratio(const Chain& chain, const JointVector& q) {
   ChainState state;
   update(chain, q, state);
-  const auto sigma = Eigen::JacobiSVD<Eigen::MatrixXd>(state.jacobian).singularValues().eval();
+  const Eigen::VectorXd sigma = test::singular_values(Eigen::MatrixXd(state.jacobian));
   return sigma[5] / sigma[0];
 }
 
@@ -52,7 +51,7 @@ JointVector onto(const SingularSets& sets, int i, JointVector q) {
       down[k] -= 1e-6;
       slope.col(k) = (residual(up) - residual(down)) / 2e-6;
     }
-    const Eigen::VectorXd step = slope.completeOrthogonalDecomposition().solve(r);
+    const Eigen::VectorXd step = test::least_squares(slope, r);
     q -= step * std::min(1.0, 0.5 / (step.norm() + 1e-12));
   }
   return q;

@@ -4,6 +4,7 @@
 #include <sigmaik/planning/time_optimal.hpp>
 
 #include "arms.hpp"
+#include "oracles.hpp"
 #include "random.hpp"
 
 using namespace sigmaik;
@@ -187,10 +188,10 @@ Kkt stationarity(const Chain& chain, const TimeOptimalResult& r, const TimeOptim
   for (std::size_t j = 0; j < one_sided.size(); ++j) {
     rows.col(static_cast<Eigen::Index>(free_rows.size() + j)) = one_sided[j];
   }
-  const Eigen::VectorXd multipliers = rows.completeOrthogonalDecomposition().solve(gradient);
+  const Eigen::VectorXd multipliers = test::least_squares(rows, gradient);
   double residual = (gradient - rows * multipliers).cwiseAbs().maxCoeff() / gradient.cwiseAbs().maxCoeff();
   // A dependent set of active rows leaves signs open: then only the residual counts.
-  if (rows.cols() == rows.completeOrthogonalDecomposition().rank()) {
+  if (rows.cols() == test::rank(rows)) {
     for (std::size_t j = 0; j < one_sided.size(); ++j) {
       const double z = multipliers[static_cast<Eigen::Index>(free_rows.size() + j)];
       residual = std::max(residual, -z * one_sided[j].cwiseAbs().maxCoeff() / gradient.cwiseAbs().maxCoeff());

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "../message.hpp"
+#include "../numbers.hpp"
 #include "band_qp.hpp"
 #include "cart_grid.hpp"
 #include "cart_sides.hpp"
@@ -16,7 +17,7 @@ namespace {
 using sigmaik::detail::message;
 using sigmaik::detail::require;
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+using sigmaik::detail::kInfinity;
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kLongest = 1e6;  // times the duration, where limits of acceleration are too tight
 

@@ -1,14 +1,14 @@
 #include "cart_grid.hpp"
+#include "../numbers.hpp"
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace sigmaik::planning {
 namespace detail {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+using sigmaik::detail::kInfinity;
 constexpr double kPi = 3.14159265358979323846;
 constexpr double kNear = 1e-6;  // [samples] a tip keeps away from the samples beside it
 constexpr int kLeap = 16;       // points inside a region that lies between two samples

@@ -1,8 +1,8 @@
 #include "cart_sides.hpp"
+#include "../numbers.hpp"
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <queue>
 #include <utility>
 #include <vector>
@@ -16,7 +16,7 @@ namespace {
 
 using sigmaik::detail::message;
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+using sigmaik::detail::kInfinity;
 constexpr double kPi = 3.14159265358979323846;
 
 // The best sides by branch and bound: a node has some regions' sides fixed and leaves out the others.

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "../message.hpp"
+#include "../numbers.hpp"
 #include "../quasi_random.hpp"
 #include "../ranges.hpp"
 
@@ -13,7 +13,7 @@ namespace {
 
 using sigmaik::detail::require;
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+using sigmaik::detail::kInfinity;
 
 void require_positive(const char* name, double value) {
   require(std::isfinite(value) && value > 0.0, name, " = ", value, " must be finite and greater than 0");

@@ -11,12 +11,13 @@
 
 #include <sigmaik/planning/cart_plane.hpp>
 
+#include "../numbers.hpp"
 #include "band_qp.hpp"
 #include "plane_ways.hpp"
 
 namespace sigmaik::planning::detail {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+using sigmaik::detail::kInfinity;
 constexpr double kPi = 3.14159265358979323846;
 constexpr int kCoarse = 121;         // samples where starts are compared
 constexpr int kCoarsePrograms = 30;  // quadratic programs of a start there

@@ -1,8 +1,8 @@
 #include "taut_string.hpp"
+#include "../numbers.hpp"
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include <sigmaik/planning/cart.hpp>
 
@@ -12,7 +12,7 @@ namespace sigmaik::planning {
 namespace detail {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+using sigmaik::detail::kInfinity;
 
 // b is below the line from a to c; mirrored for kSign −1.
 template <int kSign, typename Point>

@@ -70,7 +70,7 @@ struct PlaneCartMotion : CartMeasures {
 };
 
 /// cart_law(), measured.
-/// \throws CartError, Error as cart_law()
+/// \throws Error as cart_law()
 CartMotion cart_motion(const PlanarPath& path, double start, double end, double radius,
                        const CartOptions& options = {});
 
@@ -85,7 +85,7 @@ CartMotion cart_motion_by_descent(const PlanarPath& path, double start, double e
 /// A first guess of the descent that passes all forbidden intervals, on the sides of the exact law: a jump to the
 /// cart's range, or past the whole region where the range is infinite, and back at the end (Salvato et al. 2022, figure
 /// 9).
-/// \throws CartError, Error as cart_law()
+/// \throws Error as cart_law()
 std::vector<double> admissible_guess(const PlanarPath& path, double start, double end, double radius,
                                      const CartOptions& options = {});
 
@@ -95,7 +95,7 @@ CartMotion evaluate_cart_motion(const PlanarPath& path, std::vector<double> x, d
                                 double duration = 1.0);
 
 /// plane_cart_law(), measured.
-/// \throws CartError, Error as plane_cart_law()
+/// \throws Error as plane_cart_law()
 PlaneCartMotion plane_cart_motion(const PlanarPath& path, const AxisPair& start, const AxisPair& end, double radius,
                                   const PlaneCartOptions& options = {});
 
