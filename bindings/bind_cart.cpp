@@ -113,7 +113,15 @@ std::string summary(const CartMeasures& m) {
       .cast<std::string>();
 }
 
-void bind_motions(py::module_& m) {
+const CartOptions kDefaults;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+void bind_measures(py::module_& m) {
+  py::class_<CartRegion>(m, "CartRegion",
+                         "A connected part of the forbidden region, in the plane of time and cart position.")
+      .def_readonly("first", &CartRegion::first, "[samples] where it begins: its tip, between samples.")
+      .def_readonly("last", &CartRegion::last, "[samples] where it ends.")
+      .def_readonly("side", &CartRegion::side, "1: the law passes above λ+; −1: below λ−.");
   py::class_<CartMeasures>(
       m, "CartMeasures",
       "What motions of a cart with one axis and with two have in common: M samples, evenly spaced\n"
@@ -137,6 +145,9 @@ void bind_motions(py::module_& m) {
       .def_property_readonly(
           "t", [](const CartMeasures& c) { return array_of(c.t()); }, "(M,) [s] of the samples.")
       .def_property_readonly("time_inside", &CartMeasures::time_inside, "[s] of the samples within the radius.");
+}
+
+void bind_motion(py::module_& m) {
   py::class_<CartMotion, CartMeasures>(
       m, "CartMotion",
       "Where the cart is at each of M samples evenly spaced in time, and what it had to keep out of. Straight between\n"
@@ -179,6 +190,9 @@ void bind_motions(py::module_& m) {
           "sample", [](const CartMotion& c, const ArrayLike& t) { return sampled(c, t, 1); }, py::arg("t"),
           "x (…) [m] at times t (…) [s], held at the ends.")
       .def("__repr__", [](const CartMotion& c) { return "CartMotion(" + c.method + ", " + summary(c) + ")"; });
+}
+
+void bind_plane_motion(py::module_& m) {
   py::class_<PlaneCartMotion, CartMeasures>(
       m, "PlaneCartMotion",
       "Where a cart with two axes is at each of M samples evenly spaced in time, straight between them.")
@@ -207,18 +221,7 @@ void bind_motions(py::module_& m) {
       .def("__repr__", [](const PlaneCartMotion& c) { return "PlaneCartMotion(" + summary(c) + ")"; });
 }
 
-}  // namespace
-
-void bind_cart(py::module_& m) {
-  bind_error(m);
-  py::class_<CartRegion>(m, "CartRegion",
-                         "A connected part of the forbidden region, in the plane of time and cart position.")
-      .def_readonly("first", &CartRegion::first, "[samples] where it begins: its tip, between samples.")
-      .def_readonly("last", &CartRegion::last, "[samples] where it ends.")
-      .def_readonly("side", &CartRegion::side, "1: the law passes above λ+; −1: below λ−.");
-  bind_motions(m);
-  const CartOptions defaults;
-  const auto infinity = std::numeric_limits<double>::infinity();
+void bind_line_laws(py::module_& m) {
   m.def(
       "cart_motion",
       [](const ArrayLike& flange_xy, double start, double end, double radius_, double lower, double upper,
@@ -231,9 +234,9 @@ void bind_cart(py::module_& m) {
         return planning::cart_motion(path, start, end, radius_, options);
       },
       py::arg("flange_xy"), py::arg("start"), py::arg("end"), py::arg("radius"), py::kw_only(),
-      py::arg("lower") = -infinity, py::arg("upper") = infinity, py::arg("margin") = defaults.margin,
-      py::arg("turn") = py::none(), py::arg("duration") = defaults.duration, py::arg("max_speed") = infinity,
-      py::arg("max_acceleration") = infinity, py::arg("at_rest") = defaults.at_rest,
+      py::arg("lower") = -kInfinity, py::arg("upper") = kInfinity, py::arg("margin") = kDefaults.margin,
+      py::arg("turn") = py::none(), py::arg("duration") = kDefaults.duration, py::arg("max_speed") = kInfinity,
+      py::arg("max_acceleration") = kInfinity, py::arg("at_rest") = kDefaults.at_rest,
       "The exact law. `sigmaik.planning.cart_motion` is what to call.");
   m.def(
       "cart_motion_by_descent",
@@ -248,8 +251,8 @@ void bind_cart(py::module_& m) {
         return planning::cart_motion_by_descent(path, start, end, radius_, options, descent, std::move(from));
       },
       py::arg("flange_xy"), py::arg("start"), py::arg("end"), py::arg("radius"), py::kw_only(), py::arg("alpha"),
-      py::arg("step"), py::arg("max_iterations"), py::arg("guess") = py::none(), py::arg("margin") = defaults.margin,
-      py::arg("duration") = defaults.duration,
+      py::arg("step"), py::arg("max_iterations"), py::arg("guess") = py::none(), py::arg("margin") = kDefaults.margin,
+      py::arg("duration") = kDefaults.duration,
       "The law of the gradient descent. `sigmaik.planning.cart_motion` is what to call.");
   m.def(
       "admissible_guess",
@@ -262,10 +265,13 @@ void bind_cart(py::module_& m) {
         return array_of(planning::admissible_guess(path, start, end, radius_, options));
       },
       py::arg("flange_xy"), py::arg("start"), py::arg("end"), py::arg("radius"), py::kw_only(),
-      py::arg("lower") = -infinity, py::arg("upper") = infinity, py::arg("margin") = defaults.margin,
-      py::arg("turn") = py::none(), py::arg("duration") = defaults.duration, py::arg("max_speed") = infinity,
-      py::arg("max_acceleration") = infinity, py::arg("at_rest") = defaults.at_rest,
+      py::arg("lower") = -kInfinity, py::arg("upper") = kInfinity, py::arg("margin") = kDefaults.margin,
+      py::arg("turn") = py::none(), py::arg("duration") = kDefaults.duration, py::arg("max_speed") = kInfinity,
+      py::arg("max_acceleration") = kInfinity, py::arg("at_rest") = kDefaults.at_rest,
       "A first guess (M,) of the descent that jumps past the forbidden region, on the sides of the exact law.");
+}
+
+void bind_plane_laws(py::module_& m) {
   m.def(
       "plane_cart_motion",
       [](const ArrayLike& flange_xy, const ArrayLike& start, const ArrayLike& end, double radius_,
@@ -286,10 +292,13 @@ void bind_cart(py::module_& m) {
         return planning::plane_cart_motion(path, from, to, radius_, options);
       },
       py::arg("flange_xy"), py::arg("start"), py::arg("end"), py::arg("radius"), py::kw_only(), py::arg("lower"),
-      py::arg("upper"), py::arg("margin") = defaults.margin, py::arg("max_radius") = infinity,
-      py::arg("turn") = py::none(), py::arg("duration") = defaults.duration, py::arg("max_speed") = infinity,
-      py::arg("max_acceleration") = infinity, py::arg("at_rest") = defaults.at_rest,
+      py::arg("upper"), py::arg("margin") = kDefaults.margin, py::arg("max_radius") = kInfinity,
+      py::arg("turn") = py::none(), py::arg("duration") = kDefaults.duration, py::arg("max_speed") = kInfinity,
+      py::arg("max_acceleration") = kInfinity, py::arg("at_rest") = kDefaults.at_rest,
       "The motion with two axes. `sigmaik.planning.cart_motion_plane` is what to call.");
+}
+
+void bind_evaluation(py::module_& m) {
   m.def(
       "evaluate_cart_motion",
       [](const ArrayLike& flange_xy, const ArrayLike& x, double radius_, double margin, double duration) {
@@ -310,6 +319,9 @@ void bind_cart(py::module_& m) {
       py::arg("flange_xy"), py::arg("xy"), py::arg("radius"), py::kw_only(), py::arg("margin") = 0.0,
       py::arg("duration") = 1.0,
       "Any motion xy (M, 2) [m] of the cart, such as the straight one, looked at as `cart_motion_plane` does.");
+}
+
+void bind_parts(py::module_& m) {
   m.def(
       "forbidden_intervals",
       [](const ArrayLike& flange_xy, double radius_) -> Vectors {
@@ -348,6 +360,19 @@ void bind_cart(py::module_& m) {
       py::arg("lower"), py::arg("upper"), py::arg("guess"), py::arg("alpha"), py::arg("step"),
       py::arg("max_iterations"), py::arg("until_admissible"),
       "Gradient descent (10) from a guess (M,) [m]: the law and the number of iterations.");
+}
+
+}  // namespace
+
+void bind_cart(py::module_& m) {
+  bind_error(m);
+  bind_measures(m);
+  bind_motion(m);
+  bind_plane_motion(m);
+  bind_line_laws(m);
+  bind_plane_laws(m);
+  bind_evaluation(m);
+  bind_parts(m);
 }
 
 }  // namespace sigmaik::bindings

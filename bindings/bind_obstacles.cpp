@@ -86,9 +86,7 @@ std::vector<SpherePair> pairs_argument(const MaybeArray& pairs, const ArmSpheres
   return out;
 }
 
-}  // namespace
-
-void bind_obstacles(py::module_& m) {
+void bind_distance_field(py::module_& m) {
   py::class_<DistanceField>(
       m, "DistanceField",
       "Signed distances [m] to obstacles on a regular grid, interpolated trilinearly: positive in\n"
@@ -126,7 +124,9 @@ void bind_obstacles(py::module_& m) {
                std::to_string(f.shape()[2]) + " nodes, cell " + py::str(py::float_(f.cell())).cast<std::string>() +
                " m)";
       });
+}
 
+void bind_arm_spheres(py::module_& m) {
   py::class_<ArmSpheres>(
       m, "ArmSpheres",
       "An arm as S spheres fixed to its links, in the order in which joints move them, base to tip.\n\n"
@@ -215,7 +215,9 @@ void bind_obstacles(py::module_& m) {
       .def("__repr__", [](const ArmSpheres& s) {
         return "ArmSpheres(" + std::to_string(s.size()) + " on " + std::to_string(s.chain().dof()) + " joints)";
       });
+}
 
+void bind_collision_costs(py::module_& m) {
   m.def(
       "collision_cost",
       [](const ArmSpheres& spheres, const DistanceField& field, double clearance, double weight) {
@@ -270,6 +272,14 @@ void bind_obstacles(py::module_& m) {
       },
       py::arg("spheres"), py::arg("field"), py::arg("q"), py::arg("threads") = 1,
       "The least signed distance [m] from a sphere that moves to the obstacles at q (n,), or (B,) at q (B, n).");
+}
+
+}  // namespace
+
+void bind_obstacles(py::module_& m) {
+  bind_distance_field(m);
+  bind_arm_spheres(m);
+  bind_collision_costs(m);
 }
 
 }  // namespace sigmaik::bindings

@@ -87,7 +87,9 @@ void bind_joint_cost(py::module_& m) {
           py::arg("q"), py::arg("threads") = 1, "Gradients (B, n) at q (B, n), without the GIL.");
 }
 
-void bind_planning(py::module_& m) {
+namespace {
+
+void bind_singularity_costs(py::module_& m) {
   m.def(
       "potential_cost",
       [](const SingularSets& sets, double weight, double eta1, double eta2) {
@@ -131,7 +133,9 @@ void bind_planning(py::module_& m) {
         return std::const_pointer_cast<JointCost>(planning::sum_of_costs({costs.begin(), costs.end()}));
       },
       py::arg("costs"), "Σ of costs for the same joints.");
+}
 
+void bind_support_planner(py::module_& m) {
   m.def(
       "spline_velocities",
       [](const ArrayLike& q) {
@@ -234,7 +238,9 @@ void bind_planning(py::module_& m) {
           },
           py::arg("start"), py::arg("goal"), py::kw_only(), py::arg("deviation"), py::arg("seed"),
           "A motion from the prior about the straight line: a first guess.");
+}
 
+void bind_time_optimal(py::module_& m) {
   py::class_<TimeOptimalResult>(m, "TimeOptimalResult", "Answer of TimeOptimal.solve().")
       .def_property_readonly(
           "status", [](const TimeOptimalResult& r) { return std::string(to_string(r.status)); },
@@ -301,6 +307,14 @@ void bind_planning(py::module_& m) {
           py::arg("goal_velocity") = py::none(), py::arg("bend") = py::none(),
           "A motion between (n,) positions and velocities; `bend` (n,) is added to the first guess half-way.\n\n"
           "Raises Error where an end is outside its limits. One call at a time for each object.");
+}
+
+}  // namespace
+
+void bind_planning(py::module_& m) {
+  bind_singularity_costs(m);
+  bind_support_planner(m);
+  bind_time_optimal(m);
 }
 
 }  // namespace sigmaik::bindings

@@ -65,7 +65,7 @@ template <typename Class>
 Doubles view(const py::object& owner, std::vector<double> Class::* member, py::ssize_t columns = -1) {
   std::vector<double>& values = owner.cast<Class&>().*member;
   const auto size = static_cast<py::ssize_t>(values.size());
-  if (columns < 0) return Doubles({size}, values.data(), owner);
+  if (columns < 0) return Doubles(std::vector<py::ssize_t>{size}, values.data(), owner);
   return Doubles({columns > 0 ? size / columns : 0, columns}, values.data(), owner);
 }
 

@@ -22,6 +22,7 @@ FLAGS = [
 ]
 #: [s] machines are busy, and draw without a graphics card
 PATIENCE = 60.0
+POSE_TIMEOUT = 10.0  #: [s]
 
 
 @pytest.fixture(scope="session")
@@ -66,6 +67,16 @@ class Driven:
             self.control("target [m]").nth(box).fill(f"{value:.3f}")
             self.control("target [m]").nth(box).press("Enter")
 
+    def go_until(self, position, condition, what):
+        """Types a target until a condition holds: a target is stale after POSE_TIMEOUT, and the arm then stops."""
+        for _ in range(int(PATIENCE / (0.5 * POSE_TIMEOUT))):
+            self.go_to(*position)
+            for _ in range(int(0.5 * POSE_TIMEOUT / 0.1)):
+                if condition():
+                    return
+                self.tab.wait_for_timeout(100)
+        raise AssertionError(f"not in time: {what}")
+
     def choose(self, label, option):
         """Takes an option of a dropdown."""
         self.control(label).first.click()
@@ -84,7 +95,7 @@ def drive(browser, tmp_path):
     opened = []
 
     def drive(robot="ufactory_xarm7", **options):
-        session = Session(robot, pose_timeout=10.0, **options)
+        session = Session(robot, pose_timeout=POSE_TIMEOUT, **options)
         session.__enter__()
         server = Page(session, port=0, directory=tmp_path)
         tab = browser.new_page(viewport={"width": 1400, "height": 1000})

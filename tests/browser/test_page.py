@@ -49,11 +49,12 @@ def test_beyond_reach_and_back_within_limits(drive):
     home = session.latest["pose"][:3, 3].copy()
     page.press("Record")
     page.wait(lambda: session.recording, "recording")
-    page.go_to(2.0, 0.3, 0.7)
-    page.wait(lambda: np.linalg.norm(session.latest["pose"][:3, 3]) > 1.25, "stretched out")
-    page.wait(lambda: page.status() == "DAMPED", "the page says so")
-    page.go_to(*home)
-    page.wait(lambda: np.linalg.norm(session.latest["pose"][:3, 3] - home) < 3e-3, "back")
+
+    def stretched():
+        return np.linalg.norm(session.latest["pose"][:3, 3]) > 1.25 and page.status() == "DAMPED"
+
+    page.go_until((2.0, 0.3, 0.7), stretched, "stretched out, and the page says so")
+    page.go_until(home, lambda: np.linalg.norm(session.latest["pose"][:3, 3] - home) < 3e-3, "back")
     page.press("Stop, and save")
     page.wait(lambda: not session.recording, "recorded")
     page.tab.get_by_text("limits broken 0 times").wait_for()
@@ -77,8 +78,7 @@ def test_beyond_reach_and_back_within_limits(drive):
 
 def test_the_singular_region_is_seen(drive):
     page = drive()
-    page.go_to(0.8, 0.4, 0.6)
-    page.wait(lambda: page.status() == "DAMPED", "near the singularity")
+    page.go_until((0.8, 0.4, 0.6), lambda: page.status() == "DAMPED", "near the singularity")
     page.tab.wait_for_timeout(1500)
     assert page.server._scene.linear.visible or page.server._scene.angular.visible
     assert "threshold" in page.tab.locator("#sk-sigma").inner_text()

@@ -87,7 +87,8 @@ TEST_CASE("an application's rule answers as the library's, for every size, with 
 }
 
 TEST_CASE("a servo drives by an application's rule, inside limits, to the library's configurations") {
-  for (const auto& [arm, chain] : test::arms()) {
+  for (const auto& [name, chain] : test::arms()) {
+    const std::string& arm = name;  // for CAPTURE, which is a lambda
     Servo own(chain, OwnDls{0.1}), library(chain, DampedLeastSquares{0.1});
     const JointVector start = JointVector::Constant(chain.dof(), 0.4);
     own.reset(start);

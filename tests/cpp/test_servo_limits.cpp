@@ -300,7 +300,10 @@ TEST_CASE("scaling keeps the direction, and gets there in proportion, whenever t
       const auto largest = [](const VectorXd& from, const VectorXd& way, const VelocityBounds& bounds) {
         double low = 0.0, high = 1.0;
         for (Eigen::Index i = 0; i < way.size(); ++i) {
-          if (way[i] == 0.0) continue;
+          if (way[i] == 0.0) {
+            if (from[i] < bounds.lower[i] - 1e-12 || from[i] > bounds.upper[i] + 1e-12) return -1.0;
+            continue;
+          }
           const double a = (bounds.lower[i] - from[i]) / way[i], b = (bounds.upper[i] - from[i]) / way[i];
           low = std::max(low, std::min(a, b));
           high = std::min(high, std::max(a, b));

@@ -71,16 +71,10 @@ void check(const PlanarPath& path, const AxisPair& start, const AxisPair& end, d
   throw CartError(fault, feasible_radius, message("no cart motion (", to_string(fault), "): ", facts));
 }
 
-}  // namespace
-
-PlaneCartLaw plane_cart_law(const PlanarPath& path, const AxisPair& first, const AxisPair& last, double radius,
-                            const PlaneCartOptions& options) {
-  check(path, first, last, radius, options);
-  const Vector2d start = detail::pair(first), end = detail::pair(last);
-  const auto m = path.rows();
-  const double r = radius + options.margin;
+void check_ends(const PlanarPath& path, const Vector2d& start, const Vector2d& end, double r,
+                const PlaneCartOptions& options) {
   for (const bool at_end : {false, true}) {
-    const double distance = ((at_end ? end : start) - path.row(at_end ? m - 1 : 0).transpose()).norm();
+    const double distance = ((at_end ? end : start) - path.row(at_end ? path.rows() - 1 : 0).transpose()).norm();
     const char* which = at_end ? "end" : "start";
     if (distance <= r) {
       refuse(at_end ? CartFault::EndInside : CartFault::StartInside,
@@ -94,8 +88,10 @@ PlaneCartLaw plane_cart_law(const PlanarPath& path, const AxisPair& first, const
                      options.max_radius, " m"));
     }
   }
-  detail::PlaneSearch planner(path, start, end, r, options);
-  for (Eigen::Index i = 1; i + 1 < m; ++i) {
+}
+
+void check_samples(const PlanarPath& path, const detail::PlaneSearch& planner) {
+  for (Eigen::Index i = 1; i + 1 < path.rows(); ++i) {
     Vector2d place = path.row(i);
     if (!planner.put(path.row(i), place)) {
       refuse(CartFault::Range, kNaN,
@@ -103,60 +99,66 @@ PlaneCartLaw plane_cart_law(const PlanarPath& path, const AxisPair& first, const
                      path(i, 1), ") m, within its radii"));
     }
   }
+}
+
+// The best way without limits of speed and acceleration.
+PlanarPath free_way(detail::PlaneSearch& planner, const PlaneCartOptions& options) {
   PlanarPath c;
-  if (!planner.search(c)) {
-    const char* hint = planner.leapt() ? "; some leap over the disc between samples: more samples may help" : "";
-    if (options.turn) {
-      refuse(CartFault::Winding, kNaN,
-             message("within the cart's range no way was found that turns the point about the first joint's axis by ",
-                     *options.turn, " rad, to within half a turn", hint));
-    }
-    refuse(CartFault::Range, kNaN, message("within the cart's range no way round the point was found", hint));
+  if (planner.search(c)) return c;
+  const char* hint = planner.leapt() ? "; some leap over the disc between samples: more samples may help" : "";
+  if (options.turn) {
+    refuse(CartFault::Winding, kNaN,
+           message("within the cart's range no way was found that turns the point about the first joint's axis by ",
+                   *options.turn, " rad, to within half a turn", hint));
   }
-  const Vector2d max_speed = detail::pair(options.max_speed), max_acceleration = detail::pair(options.max_acceleration);
-  const double dt = options.duration / static_cast<double>(m - 1);
-  const auto limits = [&](double longer) {
-    return Limits{longer * dt * max_speed, longer * dt * longer * dt * max_acceleration};
+  refuse(CartFault::Range, kNaN, message("within the cart's range no way round the point was found", hint));
+}
+
+// The limits [per sample] of a duration that is `longer` times the options'.
+Limits limits_of(const PlaneCartOptions& options, Eigen::Index samples, double longer) {
+  const double dt = longer * options.duration / static_cast<double>(samples - 1);
+  return {dt * detail::pair(options.max_speed), dt * dt * detail::pair(options.max_acceleration)};
+}
+
+// A way within the limits of speed and acceleration, from the best way without them.
+PlanarPath limited_way(detail::PlaneSearch& planner, const PlanarPath& path, const PlanarPath& best,
+                       const PlaneCartOptions& options) {
+  PlanarPath c = best;
+  // Into c: within the limits of a duration so many times as long, by way of `from`.
+  const auto within = [&](double longer, const PlanarPath& from, int programs) {
+    c = from;
+    Limits inside = limits_of(options, path.rows(), longer);
+    inside.speed *= 1.0 - 1e-9;
+    inside.acceleration *= 1.0 - 1e-9;
+    return planner.improve(path, c, programs, kSettled, inside);
   };
-  if (!keeps(c, limits(1.0), options.at_rest)) {
-    // Into c: within the limits of a duration so many times as long, by way of `from`.
-    const auto within = [&](double longer, const PlanarPath& from, int programs) {
-      c = from;
-      Limits inside = limits(longer);
-      inside.speed *= 1.0 - 1e-9;
-      inside.acceleration *= 1.0 - 1e-9;
-      return planner.improve(path, c, programs, kSettled, inside);
-    };
-    PlanarPath way = c;
-    const bool slow = !keeps(way, {limits(1.0).speed}, false);
-    bool done = within(1.0, way, kPrograms);
-    if (!done) {
-      // The half-planes of a way that takes its limits into account leave more room: down to them from a longer
-      // duration.
-      double good = 2.0, bad = 1.0;
-      while (good < kLongest && !within(good, way, kNearer)) {
-        bad = good;
-        good *= 2.0;
-      }
-      for (int k = 0; k < kTightenings && good < kLongest && !done; ++k) {
-        if (k > 0 || bad > 1.0) {
-          const double middle = 0.5 * (bad + good);
-          if (!within(middle, way, kNearer)) {
-            bad = middle;
-            continue;
-          }
-          good = middle;
-        }
-        way = c;
-        done = within(1.0, way, kPrograms);
-      }
-      if (!done) {
-        refuse(slow ? CartFault::Speed : CartFault::Acceleration, kNaN,
-               message("along the best way without limits none was found that keeps to them",
-                       good < kLongest ? message("; a duration of ", good * options.duration, " s would do") : ""));
-      }
-    }
+  PlanarPath way = best;
+  if (within(1.0, way, kPrograms)) return c;
+  // The half-planes of a way that takes its limits into account leave more room: down to them from a longer duration.
+  double good = 2.0, bad = 1.0;
+  while (good < kLongest && !within(good, way, kNearer)) {
+    bad = good;
+    good *= 2.0;
   }
+  for (int k = 0; k < kTightenings && good < kLongest; ++k) {
+    if (k > 0 || bad > 1.0) {
+      const double middle = 0.5 * (bad + good);
+      if (!within(middle, way, kNearer)) {
+        bad = middle;
+        continue;
+      }
+      good = middle;
+    }
+    way = c;
+    if (within(1.0, way, kPrograms)) return c;
+  }
+  const bool slow = !keeps(best, {limits_of(options, path.rows(), 1.0).speed}, false);
+  refuse(slow ? CartFault::Speed : CartFault::Acceleration, kNaN,
+         message("along the best way without limits none was found that keeps to them",
+                 good < kLongest ? message("; a duration of ", good * options.duration, " s would do") : ""));
+}
+
+PlaneCartLaw law_of(const PlanarPath& c, const PlanarPath& path, double r, const detail::PlaneSearch& planner) {
   const PlanarPath d = c - path;
   PlaneCartLaw law;
   law.c.assign(c.data(), c.data() + c.size());
@@ -164,14 +166,29 @@ PlaneCartLaw plane_cart_law(const PlanarPath& path, const AxisPair& first, const
   law.turn = turn_of(d);
   law.starts = planner.starts();
   law.programs = planner.programs();
-  law.push.assign(static_cast<std::size_t>(m), 0.0);
-  for (Eigen::Index i = 1; i + 1 < m; ++i) {
+  law.push.assign(static_cast<std::size_t>(c.rows()), 0.0);
+  for (Eigen::Index i = 1; i + 1 < c.rows(); ++i) {
     const double distance = d.row(i).norm();
     if (distance > r * (1.0 + 1e-6)) continue;
     law.push[static_cast<std::size_t>(i)] = std::max(
         0.0, (2.0 * c.row(i) - c.row(i - 1) - c.row(i + 1)).dot(d.row(i)) / distance);
   }
   return law;
+}
+
+}  // namespace
+
+PlaneCartLaw plane_cart_law(const PlanarPath& path, const AxisPair& first, const AxisPair& last, double radius,
+                            const PlaneCartOptions& options) {
+  check(path, first, last, radius, options);
+  const Vector2d start = detail::pair(first), end = detail::pair(last);
+  const double r = radius + options.margin;
+  check_ends(path, start, end, r, options);
+  detail::PlaneSearch planner(path, start, end, r, options);
+  check_samples(path, planner);
+  const PlanarPath best = free_way(planner, options);
+  const bool fits = keeps(best, limits_of(options, path.rows(), 1.0), options.at_rest);
+  return law_of(fits ? best : limited_way(planner, path, best, options), path, r, planner);
 }
 
 }  // namespace sigmaik::planning
