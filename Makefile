@@ -62,7 +62,7 @@ wheel: .venv/.build  ## a wheel that carries its libraries, in dist/, checked in
 	tools/build_wheel.sh
 	tools/check_wheel.sh dist/*.whl
 
-build: build/release/build.ninja  ## C++ library, tests, examples and benchmarks, in build/release
+build: build/release/build.ninja  ## C++ library, tests and examples, in build/release
 	cmake --build build/release
 
 install: .venv/.package  ## the Python package, in .venv
@@ -87,7 +87,7 @@ build/release/build.ninja: CMakePresets.json | system
 
 # .build, .demo, .docs, .test, .bench: the packages that building, the demo, the site, the tests and the benchmarks need.
 .venv/.build .venv/.demo .venv/.docs .venv/.test .venv/.bench: .venv/.%: .venv/pyvenv.cfg pyproject.toml tools/requirements.py
-	$(BIN)/python -m pip install -q $$($(BIN)/python tools/requirements.py $*)
+	$(BIN)/python -m pip install -q --no-compile $$($(BIN)/python tools/requirements.py $*)
 	@touch $@
 
 .venv/.package: $(SOURCES) pyproject.toml README.md LICENSE .venv/.build | system
