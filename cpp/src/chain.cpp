@@ -12,9 +12,8 @@
 namespace sigmaik {
 namespace {
 
-using detail::require;
-
 using detail::kInfinity;
+using detail::require;
 // A larger number is a mistake or has a wrong unit.
 constexpr double kLargestOffset = 1e6;  // m
 constexpr double kLargestLimit = 1e9;   // rad, rad/s, …; infinity means "no limit"

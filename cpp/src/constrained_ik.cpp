@@ -13,9 +13,8 @@
 namespace sigmaik {
 namespace {
 
-using detail::require;
-
 using detail::kInfinity;
+using detail::require;
 constexpr double kMet = 1e-9;    // [m, rad] a smaller error counts as none
 constexpr double kAgree = 0.01;  // velocities that differ by less than this part of a joint's bounds are the same
 

@@ -14,10 +14,9 @@
 namespace sigmaik {
 namespace {
 
+using detail::kInfinity;
 using detail::kLimitTolerance;
 using detail::require;
-
-using detail::kInfinity;
 // Braking is planned this much weaker than it may be, so that the plan can make up for rounding on the way.
 constexpr double kBrakingReserve = 1e-10;
 constexpr double kSnap = 1e-12;  // [1 + rad or m] rounding of positions as they add up

@@ -51,11 +51,15 @@ class Driven:
 
     def wait(self, condition, what):
         """Waits for a condition of the session, with the browser alive."""
-        for _ in range(int(PATIENCE / 0.1)):
+        assert self._holds(condition, PATIENCE), f"not in time: {what}"
+
+    def _holds(self, condition, seconds):
+        """Whether a condition holds within some seconds."""
+        for _ in range(int(seconds / 0.1)):
             if condition():
-                return
+                return True
             self.tab.wait_for_timeout(100)
-        raise AssertionError(f"not in time: {what}")
+        return False
 
     def control(self, label):
         """The control beside a label."""
@@ -71,10 +75,8 @@ class Driven:
         """Types a target until a condition holds: a target is stale after POSE_TIMEOUT, and the arm then stops."""
         for _ in range(int(PATIENCE / (0.5 * POSE_TIMEOUT))):
             self.go_to(*position)
-            for _ in range(int(0.5 * POSE_TIMEOUT / 0.1)):
-                if condition():
-                    return
-                self.tab.wait_for_timeout(100)
+            if self._holds(condition, 0.5 * POSE_TIMEOUT):
+                return
         raise AssertionError(f"not in time: {what}")
 
     def choose(self, label, option):
