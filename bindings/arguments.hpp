@@ -155,9 +155,6 @@ void bind_constrained_ik(py::module_& m);
 void bind_analytic_ik(py::module_& m);
 void bind_indices(py::module_& m);
 void bind_singularities(py::module_& m);
-void bind_planning(py::module_& m);
-void bind_cart(py::module_& m);
-void bind_obstacles(py::module_& m);
 
 }  // namespace sigmaik::bindings
 

@@ -2,6 +2,7 @@
 #include <sigmaik/planning/cart_motion.hpp>
 #include <sigmaik/planning/cart_plane.hpp>
 
+#include "planner_options.hpp"
 #include "planning.hpp"
 
 namespace sigmaik::bindings {
@@ -34,15 +35,11 @@ std::vector<double> bounds_argument(py::handle object, const char* what) {
   return {array.data(), array.data() + array.size()};
 }
 
-// (2,) of the two axes, or one number for both where `one`, with infinities where a limit may be.
-AxisPair pair_argument(py::handle object, const char* what, bool one) {
-  const Array array = Array::ensure(object);
-  if (!array) PyErr_Clear();
-  if (array && array.ndim() == 0 && one) return {*array.data(), *array.data()};
-  if (!array || array.ndim() != 1 || array.size() != 2) {
-    throw Error(std::string(what) + " must be " + (one ? "a number, or of shape (2,)" : "numbers of shape (2,)"));
-  }
-  return {array.at(0), array.at(1)};
+// (2,) of the two axes, with infinities where a bound may be.
+AxisPair pair_argument(py::handle object, const char* what) {
+  const std::vector<double> pair = bounds_argument(object, what);
+  if (pair.size() != 2) throw Error(std::string(what) + " must be numbers of shape (2,)");
+  return {pair[0], pair[1]};
 }
 
 std::vector<double> finite_argument(py::handle object, const char* what, std::initializer_list<py::ssize_t> shape,
@@ -59,22 +56,6 @@ Doubles pairs_of(const std::vector<double>& values) {
   return Doubles({static_cast<py::ssize_t>(values.size() / 2), py::ssize_t{2}}, values.data());
 }
 Doubles pair_of(const AxisPair& values) { return Doubles(py::ssize_t{2}, values.data()); }
-
-}  // namespace
-
-namespace {
-
-CartOptions cart_options(double lower, double upper, double margin, std::optional<double> turn, double duration,
-                         double max_speed, double max_acceleration, bool at_rest) {
-  return {.lower = lower,
-          .upper = upper,
-          .margin = margin,
-          .turn = turn,
-          .duration = duration,
-          .max_speed = max_speed,
-          .max_acceleration = max_acceleration,
-          .at_rest = at_rest};
-}
 
 void bind_error(py::module_& m) {
   static const py::handle error = py::exception<CartError>(m, "CartError", m.attr("Error")).release();
@@ -112,9 +93,6 @@ std::string summary(const CartMeasures& m) {
       .format(m.samples(), m.energy, m.admissible ? "admissible" : "not admissible")
       .cast<std::string>();
 }
-
-const CartOptions kDefaults;
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 void bind_measures(py::module_& m) {
   py::class_<CartRegion>(m, "CartRegion",
@@ -221,23 +199,31 @@ void bind_plane_motion(py::module_& m) {
       .def("__repr__", [](const PlaneCartMotion& c) { return "PlaneCartMotion(" + summary(c) + ")"; });
 }
 
+constexpr std::tuple kLine{parameter<ArrayLike>("flange_xy"),
+                           parameter<double>("start"),
+                           parameter<double>("end"),
+                           parameter<double>("radius"),
+                           parameter<double>("lower", "[m] of the cart's range."),
+                           parameter<double>("upper", "[m] of the cart's range.")};
+
 void bind_line_laws(py::module_& m) {
-  m.def(
-      "cart_motion",
+  def_function<CartOptions>(m, "cart_motion", kLine, 0,
+                            "The exact law. `sigmaik.planning.cart_motion` is what to call.",
+                            [](const ArrayLike& flange_xy, double start, double end, double radius_, double lower,
+                               double upper, CartOptions options) {
+                              const PlanarPath path = path_argument(flange_xy);
+                              options.lower = lower, options.upper = upper;
+                              py::gil_scoped_release release;
+                              return planning::cart_motion(path, start, end, radius_, options);
+                            });
+  def_function<CartOptions>(
+      m, "admissible_guess", kLine, 0,
+      "A first guess (M,) of the descent that jumps past the forbidden region, on the sides of the exact law.",
       [](const ArrayLike& flange_xy, double start, double end, double radius_, double lower, double upper,
-         double margin, std::optional<double> turn, double duration, double max_speed, double max_acceleration,
-         bool at_rest) {
-        const PlanarPath path = path_argument(flange_xy);
-        const CartOptions options = cart_options(lower, upper, margin, turn, duration, max_speed, max_acceleration,
-                                                 at_rest);
-        py::gil_scoped_release release;
-        return planning::cart_motion(path, start, end, radius_, options);
-      },
-      py::arg("flange_xy"), py::arg("start"), py::arg("end"), py::arg("radius"), py::kw_only(),
-      py::arg("lower") = -kInfinity, py::arg("upper") = kInfinity, py::arg("margin") = kDefaults.margin,
-      py::arg("turn") = py::none(), py::arg("duration") = kDefaults.duration, py::arg("max_speed") = kInfinity,
-      py::arg("max_acceleration") = kInfinity, py::arg("at_rest") = kDefaults.at_rest,
-      "The exact law. `sigmaik.planning.cart_motion` is what to call.");
+         CartOptions options) {
+        options.lower = lower, options.upper = upper;
+        return array_of(planning::admissible_guess(path_argument(flange_xy), start, end, radius_, options));
+      });
   m.def(
       "cart_motion_by_descent",
       [](const ArrayLike& flange_xy, double start, double end, double radius_, double alpha, double step,
@@ -251,51 +237,26 @@ void bind_line_laws(py::module_& m) {
         return planning::cart_motion_by_descent(path, start, end, radius_, options, descent, std::move(from));
       },
       py::arg("flange_xy"), py::arg("start"), py::arg("end"), py::arg("radius"), py::kw_only(), py::arg("alpha"),
-      py::arg("step"), py::arg("max_iterations"), py::arg("guess") = py::none(), py::arg("margin") = kDefaults.margin,
-      py::arg("duration") = kDefaults.duration,
+      py::arg("step"), py::arg("max_iterations"), py::arg("guess") = py::none(),
+      py::arg("margin") = CartOptions{}.margin, py::arg("duration") = CartOptions{}.duration,
       "The law of the gradient descent. `sigmaik.planning.cart_motion` is what to call.");
-  m.def(
-      "admissible_guess",
-      [](const ArrayLike& flange_xy, double start, double end, double radius_, double lower, double upper,
-         double margin, std::optional<double> turn, double duration, double max_speed, double max_acceleration,
-         bool at_rest) {
-        const PlanarPath path = path_argument(flange_xy);
-        const CartOptions options = cart_options(lower, upper, margin, turn, duration, max_speed, max_acceleration,
-                                                 at_rest);
-        return array_of(planning::admissible_guess(path, start, end, radius_, options));
-      },
-      py::arg("flange_xy"), py::arg("start"), py::arg("end"), py::arg("radius"), py::kw_only(),
-      py::arg("lower") = -kInfinity, py::arg("upper") = kInfinity, py::arg("margin") = kDefaults.margin,
-      py::arg("turn") = py::none(), py::arg("duration") = kDefaults.duration, py::arg("max_speed") = kInfinity,
-      py::arg("max_acceleration") = kInfinity, py::arg("at_rest") = kDefaults.at_rest,
-      "A first guess (M,) of the descent that jumps past the forbidden region, on the sides of the exact law.");
 }
 
 void bind_plane_laws(py::module_& m) {
-  m.def(
-      "plane_cart_motion",
+  def_function<PlaneCartOptions>(
+      m, "plane_cart_motion",
+      std::tuple{parameter<ArrayLike>("flange_xy"), parameter<ArrayLike>("start"), parameter<ArrayLike>("end"),
+                 parameter<double>("radius"), parameter<ArrayLike>("lower", "(2,) [m] of the axes' ranges."),
+                 parameter<ArrayLike>("upper", "(2,) [m] of the axes' ranges.")},
+      0, "The motion with two axes. `sigmaik.planning.cart_motion_plane` is what to call.",
       [](const ArrayLike& flange_xy, const ArrayLike& start, const ArrayLike& end, double radius_,
-         const ArrayLike& lower, const ArrayLike& upper, double margin, double max_radius, std::optional<double> turn,
-         double duration, const ArrayLike& max_speed, const ArrayLike& max_acceleration, bool at_rest) {
+         const ArrayLike& lower, const ArrayLike& upper, PlaneCartOptions options) {
         const PlanarPath path = path_argument(flange_xy);
-        const AxisPair from = pair_argument(start, "start", false), to = pair_argument(end, "end", false);
-        const PlaneCartOptions options{.lower = pair_argument(lower, "lower", false),
-                                       .upper = pair_argument(upper, "upper", false),
-                                       .margin = margin,
-                                       .max_radius = max_radius,
-                                       .turn = turn,
-                                       .duration = duration,
-                                       .max_speed = pair_argument(max_speed, "max_speed", true),
-                                       .max_acceleration = pair_argument(max_acceleration, "max_acceleration", true),
-                                       .at_rest = at_rest};
+        const AxisPair from = pair_argument(start, "start"), to = pair_argument(end, "end");
+        options.lower = pair_argument(lower, "lower"), options.upper = pair_argument(upper, "upper");
         py::gil_scoped_release release;
         return planning::plane_cart_motion(path, from, to, radius_, options);
-      },
-      py::arg("flange_xy"), py::arg("start"), py::arg("end"), py::arg("radius"), py::kw_only(), py::arg("lower"),
-      py::arg("upper"), py::arg("margin") = kDefaults.margin, py::arg("max_radius") = kInfinity,
-      py::arg("turn") = py::none(), py::arg("duration") = kDefaults.duration, py::arg("max_speed") = kInfinity,
-      py::arg("max_acceleration") = kInfinity, py::arg("at_rest") = kDefaults.at_rest,
-      "The motion with two axes. `sigmaik.planning.cart_motion_plane` is what to call.");
+      });
 }
 
 void bind_evaluation(py::module_& m) {

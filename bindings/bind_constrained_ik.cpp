@@ -43,9 +43,16 @@ ConstrainedIkStep update(ConstrainedIk& ik, const py::object& target) {
   return ik.update(pose_argument(target, "target"));
 }
 
-}  // namespace
+// This getter throws until the first reset: nothing stands anywhere before.
+template <typename Get>
+auto once_started(Get get) {
+  return [get](const ConstrainedIk& ik) {
+    require_started(ik);
+    return to_numpy(get(ik));
+  };
+}
 
-void bind_constrained_ik(py::module_& m) {
+void bind_step(py::module_& m) {
   py::class_<ConstrainedIkStep>(m, "ConstrainedIkStep", "Answer of one cycle of a ConstrainedIk.")
       .def_property_readonly(
           "q", [](const ConstrainedIkStep& s) { return to_numpy(s.q); }, "(n,) position command [rad or m]")
@@ -76,11 +83,9 @@ void bind_constrained_ik(py::module_& m) {
         return std::string("ConstrainedIkStep(status=") + to_string(s.status) + ", used=" + to_string(s.used) +
                ", qdot=" + py::str(to_numpy(s.qdot)).cast<std::string>() + ")";
       });
+}
 
-  py::class_<ConstrainedIk> c(
-      m, "ConstrainedIk",
-      "Follows a target pose inside every joint limit: an exact part, and the rest as well as the\n"
-      "limits allow (Schreiber, Otter and Hirzinger 1999).");
+void bind_setup(py::class_<ConstrainedIk>& c) {
   def_init<ConstrainedIkOptions>(c, std::tuple{parameter<Chain>("chain")}, 1,
                                  "Warns (ModelWarning) of velocity and acceleration limits that joints lack.",
                                  [](const Chain& chain, const ConstrainedIkOptions& options) {
@@ -90,50 +95,54 @@ void bind_constrained_ik(py::module_& m) {
                                  });
   def_options(c);
   c.def(
-       "reset",
-       [](ConstrainedIk& ik, const ArrayLike& q, const MaybeArray& qdot) {
-         const int n = ik.chain().dof();
-         const JointVector start = joint_argument(q, "q", n);
-         ik.reset(start, optional_joint_argument(object_of(qdot), "qdot", n));
-         if (ik.options().limits.position) warn(ik.chain().far_outside_limits(start));
-       },
-       py::arg("q"), py::arg("qdot") = py::none(),
-       "Starts, or starts again, at q (n,), moving with qdot (n,).\n\n"
-       "Warns (ModelWarning) of a joint that starts more than 1 rad or 1 m outside its limits.")
-      .def("update", &update, py::arg("target"),
-           "One cycle towards a pose (4, 4) of the tip in the base. Raises Error where the target is no pose.")
-      .def("step", &update, py::arg("target"), "The same as update().")
-      .def_property_readonly("chain", &ConstrainedIk::chain)
+      "reset",
+      [](ConstrainedIk& ik, const ArrayLike& q, const MaybeArray& qdot) {
+        const int n = ik.chain().dof();
+        const JointVector start = joint_argument(q, "q", n);
+        ik.reset(start, optional_joint_argument(object_of(qdot), "qdot", n));
+        if (ik.options().limits.position) warn(ik.chain().far_outside_limits(start));
+      },
+      py::arg("q"), py::arg("qdot") = py::none(),
+      "Starts, or starts again, at q (n,), moving with qdot (n,).\n\n"
+      "Warns (ModelWarning) of a joint that starts more than 1 rad or 1 m outside its limits.");
+}
+
+void bind_cycle(py::class_<ConstrainedIk>& c) {
+  c.def("update", &update, py::arg("target"),
+        "One cycle towards a pose (4, 4) of the tip in the base. Raises Error where the target is no pose.")
+      .def("step", &update, py::arg("target"), "The same as update().");
+}
+
+void bind_state(py::class_<ConstrainedIk>& c) {
+  c.def_property_readonly("chain", &ConstrainedIk::chain)
       .def_property_readonly(
           "dt", [](const ConstrainedIk& ik) { return ik.options().dt; }, "[s]")
       .def_property_readonly("has_analytic", &ConstrainedIk::has_analytic, "Whether the closed form is at hand.")
-      .def_property_readonly(
-          "q",
-          [](const ConstrainedIk& ik) {
-            require_started(ik);
-            return to_numpy(ik.q());
-          },
-          "(n,) where the reference stands.")
-      .def_property_readonly(
-          "pose",
-          [](const ConstrainedIk& ik) {
-            require_started(ik);
-            return to_numpy(ik.tip().matrix());
-          },
-          "(4, 4) tip in base at q.")
-      .def_property_readonly(
-          "reference",
-          [](const ConstrainedIk& ik) {
-            require_started(ik);
-            return to_numpy(ik.reference().matrix());
-          },
-          "(4, 4) the pose that the last step aimed at: its target, slowed down by ϑ.")
+      .def_property_readonly("q", once_started([](const ConstrainedIk& ik) { return ik.q(); }),
+                             "(n,) where the reference stands.")
+      .def_property_readonly("pose", once_started([](const ConstrainedIk& ik) { return ik.tip().matrix(); }),
+                             "(4, 4) tip in base at q.")
+      .def_property_readonly("reference", once_started([](const ConstrainedIk& ik) { return ik.reference().matrix(); }),
+                             "(4, 4) the pose that the last step aimed at: its target, slowed down by ϑ.")
       .def("__repr__", [](const ConstrainedIk& ik) {
         return record("ConstrainedIk", {{"", py::cast(ik.chain())},
                                         {"dt", py::cast(ik.options().dt)},
                                         {"has_analytic", py::cast(ik.has_analytic())},
                                         {"q", ik.q().size() != 0 ? py::object(to_numpy(ik.q())) : py::none()}});
       });
+}
+
+}  // namespace
+
+void bind_constrained_ik(py::module_& m) {
+  bind_step(m);
+  py::class_<ConstrainedIk> c(
+      m, "ConstrainedIk",
+      "Follows a target pose inside every joint limit: an exact part, and the rest as well as the\n"
+      "limits allow (Schreiber, Otter and Hirzinger 1999).");
+  bind_setup(c);
+  bind_cycle(c);
+  bind_state(c);
 }
 
 }  // namespace sigmaik::bindings

@@ -126,27 +126,23 @@ void bind_distance_field(py::module_& m) {
       });
 }
 
-void bind_arm_spheres(py::module_& m) {
-  py::class_<ArmSpheres>(
-      m, "ArmSpheres",
-      "An arm as S spheres fixed to its links, in the order in which joints move them, base to tip.\n\n"
-      "`sigmaik.planning.arm_spheres` makes them from a URDF, or along the links.")
-      .def(py::init([](const Chain& chain, const std::vector<std::string>& links, const ArrayLike& centers,
-                       const ArrayLike& radii) {
-             const auto count = static_cast<py::ssize_t>(links.size());
-             const std::string length = std::to_string(count);
-             const Array c = array_argument(centers, "centers", {count, 3},
-                                            ("(" + length + ", 3), one a link").c_str());
-             const Array r = array_argument(radii, "radii", {count}, ("(" + length + ",), one a link").c_str());
-             std::vector<LinkSphere> spheres;
-             for (py::ssize_t i = 0; i < count; ++i) {
-               spheres.push_back({segment_of(chain, links[static_cast<std::size_t>(i)]),
-                                  Eigen::Map<const Eigen::Vector3d>(c.data() + 3 * i), r.data()[i]});
-             }
-             return ArmSpheres(chain, std::move(spheres));
-           }),
-           py::arg("chain"), py::arg("links"), py::arg("centers"), py::arg("radii"),
-           "links: the name of each sphere's link; centers (S, 3) [m] in the link's frame; radii (S,) [m].")
+ArmSpheres make_spheres(const Chain& chain, const std::vector<std::string>& links, const ArrayLike& centers,
+                        const ArrayLike& radii) {
+  const auto count = static_cast<py::ssize_t>(links.size());
+  const std::string length = std::to_string(count);
+  const Array c = array_argument(centers, "centers", {count, 3}, ("(" + length + ", 3), one a link").c_str());
+  const Array r = array_argument(radii, "radii", {count}, ("(" + length + ",), one a link").c_str());
+  std::vector<LinkSphere> spheres;
+  for (py::ssize_t i = 0; i < count; ++i) {
+    spheres.push_back({segment_of(chain, links[static_cast<std::size_t>(i)]),
+                       Eigen::Map<const Eigen::Vector3d>(c.data() + 3 * i), r.data()[i]});
+  }
+  return ArmSpheres(chain, std::move(spheres));
+}
+
+void bind_makers(py::class_<ArmSpheres>& c) {
+  c.def(py::init(&make_spheres), py::arg("chain"), py::arg("links"), py::arg("centers"), py::arg("radii"),
+        "links: the name of each sphere's link; centers (S, 3) [m] in the link's frame; radii (S,) [m].")
       .def_static(
           "from_urdf",
           [](const Chain& chain, const py::object& source, double radius) {
@@ -156,8 +152,11 @@ void bind_arm_spheres(py::module_& m) {
           py::arg("chain"), py::arg("source"), py::arg("radius") = 0.05,
           "Covers the boxes, cylinders and spheres of a URDF; links with meshes as along_links does.")
       .def_static("along_links", &ArmSpheres::along_links, py::arg("chain"), py::arg("radius") = 0.05,
-                  "Capsules from each link's frame to the next.")
-      .def("__len__", &ArmSpheres::size)
+                  "Capsules from each link's frame to the next.");
+}
+
+void bind_parts(py::class_<ArmSpheres>& c) {
+  c.def("__len__", &ArmSpheres::size)
       .def_property_readonly("chain", &ArmSpheres::chain, "The arm.")
       .def_property_readonly(
           "links",
@@ -184,19 +183,22 @@ void bind_arm_spheres(py::module_& m) {
           },
           "(S, 3) [m] in the link's frame.")
       .def_property_readonly("first_moving", &ArmSpheres::first_moving,
-                             "The first sphere that a joint moves; those before it belong to the base.")
-      .def(
-          "centers",
-          [](const ArmSpheres& s, const ArrayLike& q) {
-            SphereState state;
-            return map_configurations(s.chain().dof(), q, {s.size(), 3}, [&](const JointVector& joints, double* out) {
-              s.update(joints, state);
-              for (int i = 0; i < s.size(); ++i) {
-                Eigen::Map<Eigen::Vector3d>{out + 3 * i} = state.center[static_cast<std::size_t>(i)];
-              }
-            });
-          },
-          py::arg("q"), "(S, 3) [m] in the base's axes at q (n,); (B, S, 3) at q (B, n).")
+                             "The first sphere that a joint moves; those before it belong to the base.");
+}
+
+void bind_kinematics(py::class_<ArmSpheres>& c) {
+  c.def(
+       "centers",
+       [](const ArmSpheres& s, const ArrayLike& q) {
+         SphereState state;
+         return map_configurations(s.chain().dof(), q, {s.size(), 3}, [&](const JointVector& joints, double* out) {
+           s.update(joints, state);
+           for (int i = 0; i < s.size(); ++i) {
+             Eigen::Map<Eigen::Vector3d>{out + 3 * i} = state.center[static_cast<std::size_t>(i)];
+           }
+         });
+       },
+       py::arg("q"), "(S, 3) [m] in the base's axes at q (n,); (B, S, 3) at q (B, n).")
       .def(
           "jacobians",
           [](const ArmSpheres& s, const ArrayLike& q) {
@@ -211,10 +213,20 @@ void bind_arm_spheres(py::module_& m) {
               }
             });
           },
-          py::arg("q"), "∂center/∂q (S, 3, n) at q (n,); (B, S, 3, n) at q (B, n).")
-      .def("__repr__", [](const ArmSpheres& s) {
-        return "ArmSpheres(" + std::to_string(s.size()) + " on " + std::to_string(s.chain().dof()) + " joints)";
-      });
+          py::arg("q"), "∂center/∂q (S, 3, n) at q (n,); (B, S, 3, n) at q (B, n).");
+}
+
+void bind_arm_spheres(py::module_& m) {
+  py::class_<ArmSpheres> c(
+      m, "ArmSpheres",
+      "An arm as S spheres fixed to its links, in the order in which joints move them, base to tip.\n\n"
+      "`sigmaik.planning.arm_spheres` makes them from a URDF, or along the links.");
+  bind_makers(c);
+  bind_parts(c);
+  bind_kinematics(c);
+  c.def("__repr__", [](const ArmSpheres& s) {
+    return "ArmSpheres(" + std::to_string(s.size()) + " on " + std::to_string(s.chain().dof()) + " joints)";
+  });
 }
 
 void bind_collision_costs(py::module_& m) {

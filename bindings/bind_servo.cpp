@@ -13,9 +13,16 @@ ServoStep checked(const ServoStep& step) {
   return step;
 }
 
-}  // namespace
+// This getter throws until the first reset: nothing stands anywhere before.
+template <typename Get>
+auto once_started(Get get) {
+  return [get](const Servo& servo) {
+    require_started(servo);
+    return to_numpy(get(servo));
+  };
+}
 
-void bind_servo(py::module_& m) {
+void bind_step(py::module_& m) {
   py::class_<ServoStep>(m, "ServoStep", "Answer of one cycle of a Servo.")
       .def_property_readonly(
           "q", [](const ServoStep& s) { return to_numpy(s.q); }, "(n,) position command [rad or m]")
@@ -58,12 +65,9 @@ void bind_servo(py::module_& m) {
         return std::string("ServoStep(status=") + to_string(s.status) +
                ", qdot=" + py::str(to_numpy(s.qdot)).cast<std::string>() + ")";
       });
+}
 
-  py::class_<Servo> c(
-      m, "Servo",
-      "Drives a chain's reference configuration towards poses, or along twists, one cycle a call.\n\n"
-      "It integrates its own command (q ← q + q̇ dt) and reads no measured positions. Every command holds\n"
-      "the chain's limits and leaves room to go on holding them; a start outside them comes back.");
+void bind_setup(py::class_<Servo>& c) {
   def_init<ServoOptions>(c, std::tuple{parameter<Chain>("chain"), parameter<Method>("method")}, 1,
                          "Warns (ModelWarning) of velocity and acceleration limits that joints lack.",
                          [](const Chain& chain, const Method& method, const ServoOptions& options) {
@@ -73,31 +77,34 @@ void bind_servo(py::module_& m) {
                          });
   def_options(c);
   c.def(
-       "reset",
-       [](Servo& s, const ArrayLike& q, const MaybeArray& qdot) {
-         const JointVector start = joint_argument(q, "q", s.chain().dof());
-         s.reset(start, optional_joint_argument(object_of(qdot), "qdot", s.chain().dof()));
-         if (s.options().limits.position) warn(s.chain().far_outside_limits(start));
+      "reset",
+      [](Servo& s, const ArrayLike& q, const MaybeArray& qdot) {
+        const JointVector start = joint_argument(q, "q", s.chain().dof());
+        s.reset(start, optional_joint_argument(object_of(qdot), "qdot", s.chain().dof()));
+        if (s.options().limits.position) warn(s.chain().far_outside_limits(start));
+      },
+      py::arg("q"), py::arg("qdot") = py::none(),
+      "Starts, or starts again, at q (n,): forgets all history, and pins the posture there unless one was "
+      "given.\n\n"
+      "qdot: (n,) how the arm moves now, from which the command is faded; None: it stands.\n"
+      "Warns (ModelWarning) of a joint that starts more than 1 rad or 1 m outside its limits.");
+}
+
+void bind_cycle(py::class_<Servo>& c) {
+  c.def(
+       "update",
+       [](Servo& s, const py::object& target, const MaybeArray& feedforward) {
+         require_started(s);
+         const Pose pose = pose_argument(target, "target");
+         const Twist twist = feedforward ? twist_argument(*feedforward, "feedforward") : Twist(Twist::Zero());
+         return checked(s.update(pose, twist));
        },
-       py::arg("q"), py::arg("qdot") = py::none(),
-       "Starts, or starts again, at q (n,): forgets all history, and pins the posture there unless one was "
-       "given.\n\n"
-       "qdot: (n,) how the arm moves now, from which the command is faded; None: it stands.\n"
-       "Warns (ModelWarning) of a joint that starts more than 1 rad or 1 m outside its limits.")
-      .def(
-          "update",
-          [](Servo& s, const py::object& target, const MaybeArray& feedforward) {
-            require_started(s);
-            const Pose pose = pose_argument(target, "target");
-            const Twist twist = feedforward ? twist_argument(*feedforward, "feedforward") : Twist(Twist::Zero());
-            return checked(s.update(pose, twist));
-          },
-          py::arg("target"), py::arg("feedforward") = py::none(),
-          "One cycle towards a pose (4, 4) of the tip in the base.\n\n"
-          "feedforward: (6,) twist [v; ω] of a target that moves, base axes, at its origin, added to gain × error. "
-          "Behind\n"
-          "    a target of constant twist the tip lags by speed/gain without it, and not at all with it.\n"
-          "Raises Error, and holds, where the target is not a pose.")
+       py::arg("target"), py::arg("feedforward") = py::none(),
+       "One cycle towards a pose (4, 4) of the tip in the base.\n\n"
+       "feedforward: (6,) twist [v; ω] of a target that moves, base axes, at its origin, added to gain × error. "
+       "Behind\n"
+       "    a target of constant twist the tip lags by speed/gain without it, and not at all with it.\n"
+       "Raises Error, and holds, where the target is not a pose.")
       .def(
           "update_twist",
           [](Servo& s, const ArrayLike& twist) {
@@ -109,31 +116,38 @@ void bind_servo(py::module_& m) {
       .def("continue_from", &Servo::continue_from, py::arg("other"),
            "Takes over from another servo of the same arm and dt, in the midst of its motion.\n\n"
            "Rule and options are this one's; what it commands is faded in from the other's last velocity over "
-           "soft_start.")
-      .def_property("method", &Servo::method, &Servo::set_method, "The rule; may be changed between cycles.")
+           "soft_start.");
+}
+
+void bind_state(py::class_<Servo>& c) {
+  c.def_property("method", &Servo::method, &Servo::set_method, "The rule; may be changed between cycles.")
       .def_property_readonly("chain", &Servo::chain)
       .def_property_readonly(
           "dt", [](const Servo& s) { return s.options().dt; }, "[s]")
-      .def_property_readonly(
-          "q",
-          [](const Servo& s) {
-            require_started(s);
-            return to_numpy(s.q());
-          },
-          "(n,) where the reference stands.")
-      .def_property_readonly(
-          "pose",
-          [](const Servo& s) {
-            require_started(s);
-            return to_numpy(s.tip().matrix());
-          },
-          "(4, 4) tip in base at q.")
+      .def_property_readonly("q", once_started([](const Servo& s) { return s.q(); }),
+                             "(n,) where the reference stands.")
+      .def_property_readonly("pose", once_started([](const Servo& s) { return s.tip().matrix(); }),
+                             "(4, 4) tip in base at q.")
       .def("__repr__", [](const Servo& s) {
         return record("Servo", {{"", py::cast(s.chain())},
                                 {"", method_to_python(s.method())},
                                 {"dt", py::cast(s.options().dt)},
                                 {"q", s.q().size() != 0 ? py::object(to_numpy(s.q())) : py::none()}});
       });
+}
+
+}  // namespace
+
+void bind_servo(py::module_& m) {
+  bind_step(m);
+  py::class_<Servo> c(
+      m, "Servo",
+      "Drives a chain's reference configuration towards poses, or along twists, one cycle a call.\n\n"
+      "It integrates its own command (q ← q + q̇ dt) and reads no measured positions. Every command holds\n"
+      "the chain's limits and leaves room to go on holding them; a start outside them comes back.");
+  bind_setup(c);
+  bind_cycle(c);
+  bind_state(c);
 }
 
 }  // namespace sigmaik::bindings

@@ -121,16 +121,22 @@ py::array read(ServoLoop& loop) {
   return out;
 }
 
-}  // namespace
+// Python's other threads run on while the arm comes to rest.
+void stop(ServoLoop& loop) {
+  const py::gil_scoped_release release;
+  loop.stop();
+}
 
-void bind_servo_loop(py::module_& m) {
+void bind_command(py::module_& m) {
   py::native_enum<LoopCommand>(m, "LoopCommand", "enum.IntEnum", "What a cycle of a ServoLoop followed.")
       .value("HOLD", LoopCommand::Hold)
       .value("POSE", LoopCommand::FollowPose)
       .value("TWIST", LoopCommand::FollowTwist)
       .value("STALE", LoopCommand::Stale)
       .finalize();
+}
 
+void bind_statistics(py::module_& m) {
   py::class_<LoopStatistics>(m, "LoopStatistics", "How a ServoLoop keeps its rate.")
       .def_readonly("cycles", &LoopStatistics::cycles)
       .def_readonly("missed", &LoopStatistics::missed, "Cycles left out, as their time had passed.")
@@ -145,28 +151,27 @@ void bind_servo_loop(py::module_& m) {
                                          {"worst_delay", py::cast(s.worst_delay)},
                                          {"rate", py::cast(s.rate())}});
       });
+}
 
-  py::class_<ServoLoop> c(
-      m, "ServoLoop",
-      "A servo in a thread of its own, at its own rate, whatever Python does meanwhile.\n\n"
-      "Commands hold until they are stale: an arm whose commander hangs, or is gone, stops by itself, within its\n"
-      "limits. Late cycles are counted and left out, never made up for by a burst.");
+void bind_thread(py::class_<ServoLoop>& c) {
   def_init<ServoLoopOptions>(c, std::tuple{parameter<Servo>("servo", "has started (reset); it is copied.")}, 0, "",
                              [](const Servo& servo, const ServoLoopOptions& options) {
                                return std::make_unique<ServoLoop>(servo, ServoLoop::Sink{}, options);
                              });
   c.def("start", &ServoLoop::start,
         "Starts the thread. Raises Error where it runs already, or the system refuses the priority.")
-      .def("stop", &ServoLoop::stop, py::call_guard<py::gil_scoped_release>(),
-           "Brings the arm to rest, in a second at most, and ends the thread.")
-      .def_property_readonly("running", &ServoLoop::running)
-      .def(
-          "follow",
-          [](ServoLoop& loop, const py::object& target, double timeout) {
-            loop.follow(pose_argument(target, "target"), timeout);
-          },
-          py::arg("target"), py::arg("timeout"),
-          "Follows a pose (4, 4) of the tip in the base, for `timeout` [s] unless it is said again.")
+      .def("stop", &stop, "Brings the arm to rest, in a second at most, and ends the thread.")
+      .def_property_readonly("running", &ServoLoop::running);
+}
+
+void bind_targets(py::class_<ServoLoop>& c) {
+  c.def(
+       "follow",
+       [](ServoLoop& loop, const py::object& target, double timeout) {
+         loop.follow(pose_argument(target, "target"), timeout);
+       },
+       py::arg("target"), py::arg("timeout"),
+       "Follows a pose (4, 4) of the tip in the base, for `timeout` [s] unless it is said again.")
       .def(
           "follow_twist",
           [](ServoLoop& loop, const ArrayLike& twist, double timeout) {
@@ -179,36 +184,53 @@ void bind_servo_loop(py::module_& m) {
            "Goes on with another servo (a copy) of the same arm and dt: other rule, other options.\n\n"
            "The new servo takes over the motion. With `restart` it starts where it was reset to, in simulation only:\n"
            "a real arm would jump.\n"
-           "Returns a number, one more each time, by which samples tell it; 0 is the first servo's.")
-      .def("read", &read,
-           "(N,) structured array: what was done in each cycle since the last call.\n\n"
-           "cycle, time [s] since start(), command (LoopCommand), configuration, restarted, status (Status), q and "
-           "qdot (n,), target and\n"
-           "pose (4, 4) of the tip, pose_error, asked_twist and achieved_twist (6,), singular_values (NaN while "
-           "holding),\n"
-           "singular (bits), singular_directions (6, 6) (ServoStep's columns, NaN beyond them), limiting_joints "
-           "(bits),\n"
-           "scale.")
+           "Returns a number, one more each time, by which samples tell it; 0 is the first servo's.");
+}
+
+void bind_records(py::class_<ServoLoop>& c) {
+  c.def("read", &read,
+        "(N,) structured array: what was done in each cycle since the last call.\n\n"
+        "cycle, time [s] since start(), command (LoopCommand), configuration, restarted, status (Status), q and "
+        "qdot (n,), target and\n"
+        "pose (4, 4) of the tip, pose_error, asked_twist and achieved_twist (6,), singular_values (NaN while "
+        "holding),\n"
+        "singular (bits), singular_directions (6, 6) (ServoStep's columns, NaN beyond them), limiting_joints "
+        "(bits),\n"
+        "scale.")
       .def_property_readonly("statistics", &ServoLoop::statistics)
       .def_property_readonly("dt", &ServoLoop::dt, "[s]")
-      .def("__repr__",
-           [](const ServoLoop& loop) {
-             return record(
-                 "ServoLoop",
-                 {{"dof", py::cast(loop.dof())}, {"dt", py::cast(loop.dt())}, {"running", py::cast(loop.running())}});
-           })
-      .def("__enter__",
-           [](const py::object& self) {
-             self.cast<ServoLoop&>().start();
-             return self;
-           })
+      .def("__repr__", [](const ServoLoop& loop) {
+        return record(
+            "ServoLoop",
+            {{"dof", py::cast(loop.dof())}, {"dt", py::cast(loop.dt())}, {"running", py::cast(loop.running())}});
+      });
+}
+
+void bind_context(py::class_<ServoLoop>& c) {
+  c.def("__enter__",
+        [](const py::object& self) {
+          self.cast<ServoLoop&>().start();
+          return self;
+        })
       .def(
-          "__exit__",
-          [](ServoLoop& loop, const py::object&, const py::object&, const py::object&) {
-            const py::gil_scoped_release release;
-            loop.stop();
-          },
+          "__exit__", [](ServoLoop& loop, const py::object&, const py::object&, const py::object&) { stop(loop); },
           py::arg("type"), py::arg("value"), py::arg("traceback"));
+}
+
+}  // namespace
+
+void bind_servo_loop(py::module_& m) {
+  bind_command(m);
+  bind_statistics(m);
+  py::class_<ServoLoop> c(
+      m, "ServoLoop",
+      "A servo in a thread of its own, at its own rate, whatever Python does meanwhile.\n\n"
+      "Commands hold until they are stale: an arm whose commander hangs, or is gone, stops by itself, within its\n"
+      "limits. Late cycles are counted and left out, never made up for by a burst.");
+  bind_thread(c);
+  bind_targets(c);
+  bind_records(c);
+  bind_context(c);
 }
 
 }  // namespace sigmaik::bindings

@@ -135,7 +135,7 @@ StatusObject status_object(planning::PlanStatus status) {
 
 std::string number_text(double value) { return py::str("{:.4g}").format(value).cast<std::string>(); }
 
-void bind_clearance(py::module_& m) {
+void bind_crossing(py::module_& m) {
   py::class_<Crossing>(m, "Crossing",
                        "A motion goes through a singular set here, or so near to it that the set's potential does not\n"
                        "tell the difference.")
@@ -164,20 +164,23 @@ void bind_clearance(py::module_& m) {
                         return Crossing{s[0].cast<std::string>(), s[1].cast<double>(), s[2].cast<std::vector<double>>(),
                                         s[3].cast<double>(), s[4].cast<bool>()};
                       }));
+}
 
-  py::class_<Clearance>(m, "Clearance", "Singularity along a motion that is sampled densely, M samples.")
-      .def(py::init([](const ArrayLike& t, const ArrayLike& manipulability, const std::vector<std::string>& names,
-                       const ArrayLike& psi, const std::vector<Crossing>& crossings) {
-             Clearance out;
-             out.t = numbers(t, "t", {-1}, "(M,)");
-             const auto count = static_cast<py::ssize_t>(out.t.size()), sets = static_cast<py::ssize_t>(names.size());
-             out.manipulability = numbers(manipulability, "manipulability", {count}, "(M,)");
-             out.names = names;
-             out.psi = numbers(psi, "psi", {count, sets}, "(M, c)");
-             out.crossings = crossings;
-             return out;
-           }),
-           py::arg("t"), py::arg("manipulability"), py::arg("names"), py::arg("psi"), py::arg("crossings"))
+Clearance make_clearance(const ArrayLike& t, const ArrayLike& manipulability, const std::vector<std::string>& names,
+                         const ArrayLike& psi, const std::vector<Crossing>& crossings) {
+  Clearance out;
+  out.t = numbers(t, "t", {-1}, "(M,)");
+  const auto count = static_cast<py::ssize_t>(out.t.size()), sets = static_cast<py::ssize_t>(names.size());
+  out.manipulability = numbers(manipulability, "manipulability", {count}, "(M,)");
+  out.names = names;
+  out.psi = numbers(psi, "psi", {count, sets}, "(M, c)");
+  out.crossings = crossings;
+  return out;
+}
+
+void bind_clearance_samples(py::class_<Clearance>& cls) {
+  cls.def(py::init(&make_clearance), py::arg("t"), py::arg("manipulability"), py::arg("names"), py::arg("psi"),
+          py::arg("crossings"))
       .def_property_readonly("t", column(&Clearance::t), "(M,) [s]")
       .def_property_readonly("manipulability", column(&Clearance::manipulability), "(M,) √det(JJᵀ)")
       .def_property_readonly(
@@ -190,9 +193,12 @@ void bind_clearance(py::module_& m) {
             if (c.names.empty()) return Doubles(std::vector<py::ssize_t>{static_cast<py::ssize_t>(c.t.size()), 0});
             return view(self, &Clearance::psi, static_cast<py::ssize_t>(c.names.size()));
           },
-          "(M, c) ψ of every set: 0 on it.")
-      .def_property_readonly(
-          "crossings", [](const Clearance& c) { return crossings_of(c, std::nullopt); }, "In the order of time.")
+          "(M, c) ψ of every set: 0 on it.");
+}
+
+void bind_clearance_summary(py::class_<Clearance>& cls) {
+  cls.def_property_readonly(
+         "crossings", [](const Clearance& c) { return crossings_of(c, std::nullopt); }, "In the order of time.")
       .def_property_readonly(
           "avoidable", [](const Clearance& c) { return crossings_of(c, true); },
           "Crossings that a path from start to goal can do without.")
@@ -210,18 +216,23 @@ void bind_clearance(py::module_& m) {
             return c.names[static_cast<std::size_t>(i)];
           },
           "The set with the smallest ψ; None where no sets are known.")
-      .def("__repr__",
-           [](const Clearance& c) {
-             return "Clearance(min_manipulability=" + number_text(c.min_manipulability()) + ", " +
-                    std::to_string(c.crossings.size()) + " crossings)";
-           })
-      .def(py::pickle(
-          [](const Clearance& c) { return py::make_tuple(c.t, c.manipulability, c.names, c.psi, c.crossings); },
-          [](const py::tuple& s) {
-            return Clearance{s[0].cast<std::vector<double>>(), s[1].cast<std::vector<double>>(),
-                             s[2].cast<std::vector<std::string>>(), s[3].cast<std::vector<double>>(),
-                             s[4].cast<std::vector<Crossing>>()};
-          }));
+      .def("__repr__", [](const Clearance& c) {
+        return "Clearance(min_manipulability=" + number_text(c.min_manipulability()) + ", " +
+               std::to_string(c.crossings.size()) + " crossings)";
+      });
+}
+
+void bind_clearance(py::module_& m) {
+  py::class_<Clearance> cls(m, "Clearance", "Singularity along a motion that is sampled densely, M samples.");
+  bind_clearance_samples(cls);
+  bind_clearance_summary(cls);
+  cls.def(
+      py::pickle([](const Clearance& c) { return py::make_tuple(c.t, c.manipulability, c.names, c.psi, c.crossings); },
+                 [](const py::tuple& s) {
+                   return Clearance{s[0].cast<std::vector<double>>(), s[1].cast<std::vector<double>>(),
+                                    s[2].cast<std::vector<std::string>>(), s[3].cast<std::vector<double>>(),
+                                    s[4].cast<std::vector<Crossing>>()};
+                 }));
 }
 
 void bind_playback(py::module_& m) {
@@ -275,27 +286,22 @@ void bind_playback(py::module_& m) {
       "settle is not finite or negative.");
 }
 
-}  // namespace
-
-void bind_trajectory(py::module_& m) {
-  bind_clearance(m);
-  py::class_<Trajectory>(
-      m, "Trajectory",
-      "Joint positions over time, N samples of n joints, and how they were found.\n\n"
-      "Between samples the acceleration is constant, or, where `cubic`, changes evenly: `sample` is\n"
-      "exact. A failed plan has no samples: its arrays are empty.")
-      .def(py::init(&make_trajectory), py::arg("t"), py::arg("q"), py::arg("qdot"), py::arg("qddot"),
-           py::arg("duration"), py::arg("status"), py::arg("cost"), py::arg("solve_time"), py::arg("iterations") = 0,
-           py::arg("starts") = 1, py::arg("cubic") = false, py::arg("clearance") = py::none())
+void bind_samples(py::class_<Trajectory>& c) {
+  c.def(py::init(&make_trajectory), py::arg("t"), py::arg("q"), py::arg("qdot"), py::arg("qddot"), py::arg("duration"),
+        py::arg("status"), py::arg("cost"), py::arg("solve_time"), py::arg("iterations") = 0, py::arg("starts") = 1,
+        py::arg("cubic") = false, py::arg("clearance") = py::none())
       .def(py::init<const Trajectory&>(), py::arg("other"), "A copy.")
       .def_property_readonly("t", column(&Trajectory::t), "(N,) [s]")
       .def_property_readonly("q", rows(&Trajectory::q), "(N, n) [rad or m]")
       .def_property_readonly("qdot", rows(&Trajectory::qdot), "(N, n) [rad/s or m/s]")
       .def_property_readonly("qddot", rows(&Trajectory::qddot),
                              "(N, n) [rad/s² or m/s²], of the step that begins at the sample, zero in the last row;\n"
-                             "where `cubic`, at the sample.")
-      .def_readonly("duration", &Trajectory::duration,
-                    "[s]; nan where the plan failed. See the planner for what it counts.")
+                             "where `cubic`, at the sample.");
+}
+
+void bind_outcome(py::class_<Trajectory>& c) {
+  c.def_readonly("duration", &Trajectory::duration,
+                 "[s]; nan where the plan failed. See the planner for what it counts.")
       .def_property_readonly(
           "status", [](const Trajectory& p) { return status_object(p.status); },
           "'optimal', a local minimum; 'feasible', within all constraints, but with something left to gain; 'failed'.")
@@ -308,75 +314,85 @@ void bind_trajectory(py::module_& m) {
       .def_property_readonly(
           "clearance", [](const Trajectory& p) -> const Clearance* { return p.clearance ? &*p.clearance : nullptr; },
           py::return_value_policy::reference_internal,
-          "How near to singularities the motion comes, between the samples too; None where the plan failed.")
-      .def(
-          "sample",
-          [](const Trajectory& p, const ArrayLike& t) -> Samples {
-            const JointSamples samples = p.sample(numbers(t, "t", {-1}, "(M,)"));
-            return py::make_tuple(rows_of(samples.q, p.dof), rows_of(samples.qdot, p.dof),
-                                  rows_of(samples.qddot, p.dof));
-          },
-          py::arg("t"),
-          "q, q̇, q̈ (M, n) at times t (M,) [s], held at the ends. Raises Error where there is nothing to sample.")
+          "How near to singularities the motion comes, between the samples too; None where the plan failed.");
+}
+
+void bind_times(py::class_<Trajectory>& c) {
+  c.def(
+       "sample",
+       [](const Trajectory& p, const ArrayLike& t) -> Samples {
+         const JointSamples samples = p.sample(numbers(t, "t", {-1}, "(M,)"));
+         return py::make_tuple(rows_of(samples.q, p.dof), rows_of(samples.qdot, p.dof), rows_of(samples.qddot, p.dof));
+       },
+       py::arg("t"),
+       "q, q̇, q̈ (M, n) at times t (M,) [s], held at the ends. Raises Error where there is nothing to sample.")
       .def("retimed", &Trajectory::retimed, py::arg("duration"),
-           "The same path in another duration [s], faster or slower everywhere by the same factor.")
-      .def(py::pickle(
-          [](const Trajectory& p) {
-            return py::make_tuple(p.dof, p.t, p.q, p.qdot, p.qddot, p.duration, to_string(p.status), p.cost,
-                                  p.solve_time, p.iterations, p.starts, p.cubic, p.clearance);
-          },
-          [](const py::tuple& s) {
-            using Numbers = std::vector<double>;
-            return Trajectory{s[0].cast<int>(),
-                              s[1].cast<Numbers>(),
-                              s[2].cast<Numbers>(),
-                              s[3].cast<Numbers>(),
-                              s[4].cast<Numbers>(),
-                              s[5].cast<double>(),
-                              planning::plan_status(s[6].cast<std::string>()),
-                              s[7].cast<double>(),
-                              s[8].cast<double>(),
-                              s[9].cast<int>(),
-                              s[10].cast<int>(),
-                              s[11].cast<bool>(),
-                              s[12].cast<std::optional<Clearance>>()};
-          }))
+           "The same path in another duration [s], faster or slower everywhere by the same factor.");
+}
+
+void bind_pickle(py::class_<Trajectory>& c) {
+  c.def(py::pickle(
+      [](const Trajectory& p) {
+        return py::make_tuple(p.dof, p.t, p.q, p.qdot, p.qddot, p.duration, to_string(p.status), p.cost, p.solve_time,
+                              p.iterations, p.starts, p.cubic, p.clearance);
+      },
+      [](const py::tuple& s) {
+        using Numbers = std::vector<double>;
+        return Trajectory{s[0].cast<int>(),
+                          s[1].cast<Numbers>(),
+                          s[2].cast<Numbers>(),
+                          s[3].cast<Numbers>(),
+                          s[4].cast<Numbers>(),
+                          s[5].cast<double>(),
+                          planning::plan_status(s[6].cast<std::string>()),
+                          s[7].cast<double>(),
+                          s[8].cast<double>(),
+                          s[9].cast<int>(),
+                          s[10].cast<int>(),
+                          s[11].cast<bool>(),
+                          s[12].cast<std::optional<Clearance>>()};
+      }));
+}
+
+// Python writes the files. The import waits for a call, as that module imports this one.
+template <typename... Arguments>
+py::object call_files(const char* function, const Arguments&... arguments) {
+  return py::module_::import("sigmaik.planning.files").attr(function)(arguments...);
+}
+
+void bind_files(py::class_<Trajectory>& c) {
+  c.def(
+       "plot",
+       [](const py::object& self, const PathLike& file, const std::optional<Chain>& chain) {
+         return Path(call_files("plot", self, file, chain));
+       },
+       py::arg("file"), py::arg("chain") = py::none(),
+       "Writes a picture, `planning.figure.trajectory_figure`, as PNG, whole or not at all. Returns its path.\n\n"
+       "Raises Error where there is nothing to draw, the chain has other joints, or the file's name does not end "
+       "in\n"
+       ".png, and MissingPackage where matplotlib is not installed.")
       .def(
-          "plot",
-          [](const py::object& self, const PathLike& file, const std::optional<Chain>& chain) {
-            return Path(py::module_::import("sigmaik.planning.files").attr("plot")(self, file, chain));
-          },
-          py::arg("file"), py::arg("chain") = py::none(),
-          "Writes a picture, `planning.figure.trajectory_figure`, as PNG, whole or not at all. Returns its path.\n\n"
-          "Raises Error where there is nothing to draw, the chain has other joints, or the file's name does not end "
-          "in\n"
-          ".png, and MissingPackage where matplotlib is not installed.")
-      .def(
-          "save",
-          [](const py::object& self, const PathLike& file) {
-            return Path(py::module_::import("sigmaik.planning.files").attr("save")(self, file));
-          },
+          "save", [](const py::object& self, const PathLike& file) { return Path(call_files("save", self, file)); },
           py::arg("file"),
           "Writes a file, whole or not at all, and returns its path. A name that ends in .csv gives the text that C++\n"
           "reads too (planning/trajectory.hpp), without the clearance; any other name an npz file that numpy.load "
           "reads\n"
           "without pickles.")
       .def_static(
-          "load",
-          [](const PathLike& file) {
-            return py::module_::import("sigmaik.planning.files").attr("load")(file).cast<Trajectory>();
-          },
-          py::arg("file"), "What `save` has written. Raises Error where the file is something else.")
+          "load", [](const PathLike& file) { return call_files("load", file).cast<Trajectory>(); }, py::arg("file"),
+          "What `save` has written. Raises Error where the file is something else.")
       .def("_save_text", &Trajectory::save, py::arg("file"))
-      .def_static("_load_text", &Trajectory::load, py::arg("file"))
-      .def("__len__", &Trajectory::size)
-      .def("__repr__", [](const Trajectory& p) {
-        const std::string what = to_string(p.status);
-        if (p.t.empty()) return "Trajectory(" + what + ")";
-        return "Trajectory(" + what + ", " + std::to_string(p.size()) + " samples of " + std::to_string(p.dof) +
-               " joints, " + number_text(p.duration) + " s, cost " + number_text(p.cost) + ")";
-      });
-  bind_playback(m);
+      .def_static("_load_text", &Trajectory::load, py::arg("file"));
+}
+
+std::string trajectory_text(const Trajectory& p) {
+  const std::string what = to_string(p.status);
+  if (p.t.empty()) return "Trajectory(" + what + ")";
+  return "Trajectory(" + what + ", " + std::to_string(p.size()) + " samples of " + std::to_string(p.dof) + " joints, " +
+         number_text(p.duration) + " s, cost " + number_text(p.cost) + ")";
+}
+
+void bind_clearance_function(py::module_& m) {
   m.def(
       "clearance",
       [](const Chain& chain, const std::optional<SingularSets>& sets, const ArrayLike& t, const ArrayLike& q,
@@ -390,6 +406,26 @@ void bind_trajectory(py::module_& m) {
       "sets: the arm's singular sets, or None.\n"
       "width: η₂ [1/rad²]: sets of codimension above 1 count as crossed where ψ < 1/(2 width) between ends that are\n"
       "    both outside.");
+}
+
+}  // namespace
+
+void bind_trajectory(py::module_& m) {
+  bind_crossing(m);
+  bind_clearance(m);
+  py::class_<Trajectory> c(
+      m, "Trajectory",
+      "Joint positions over time, N samples of n joints, and how they were found.\n\n"
+      "Between samples the acceleration is constant, or, where `cubic`, changes evenly: `sample` is\n"
+      "exact. A failed plan has no samples: its arrays are empty.");
+  bind_samples(c);
+  bind_outcome(c);
+  bind_times(c);
+  bind_pickle(c);
+  bind_files(c);
+  c.def("__len__", &Trajectory::size).def("__repr__", &trajectory_text);
+  bind_playback(m);
+  bind_clearance_function(m);
 }
 
 }  // namespace sigmaik::bindings

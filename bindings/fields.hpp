@@ -19,6 +19,7 @@
 #include <cmath>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <tuple>
@@ -240,6 +241,33 @@ struct Argument<Method> {
   static py::object to(const Method& value) { return py::cast(value); }
 };
 
+/// A cost, or any other object that others may hold, too.
+template <typename T>
+struct Argument<std::shared_ptr<T>> {
+  static constexpr bool kNone = false;
+  static std::string type() { return Argument<T>::type(); }
+  static std::shared_ptr<T> from(py::handle object, const char* what) {
+    Argument<T>::from(object, what);
+    return object.cast<std::shared_ptr<T>>();
+  }
+};
+
+/// Objects of Python.
+template <>
+struct Argument<std::vector<py::object>> {
+  static constexpr bool kNone = false;
+  static std::string type() { return "collections.abc.Sequence[typing.Any]"; }
+  static std::vector<py::object> from(py::handle object, const char* what) {
+    return converted<std::vector<py::object>>(object, what, "a sequence");
+  }
+};
+
+/// An answer.
+template <>
+struct Argument<py::array_t<double>> {
+  static std::string type() { return "numpy.typing.NDArray[numpy.float64]"; }
+};
+
 /// Read later, by who knows its shape.
 template <>
 struct Argument<ArrayLike> {
@@ -350,6 +378,16 @@ Keywords to_dict(const Options& options) {
   Keywords out;
   for_each_field(
       options, [&]<typename T>(const char* name, const T& value, const char*) { out[name] = Argument<T>::to(value); });
+  return out;
+}
+
+/// The table of a struct as Python objects: a tuple (name, type, default, doc) for each keyword.
+template <typename Options>
+py::list table_of() {
+  std::vector<Slot> slots;
+  add_options<Options>(slots);
+  py::list out;
+  for (const Slot& slot : slots) out.append(py::make_tuple(slot.name, slot.type, slot.text, slot.doc));
   return out;
 }
 

@@ -1,6 +1,7 @@
 #include <pybind11/native_enum.h>
 
 #include "fields.hpp"
+#include "planner_options.hpp"
 #include "planning.hpp"
 
 namespace sigmaik::bindings {
@@ -48,6 +49,22 @@ void bind_status(py::module_& m) {
       py::arg("vector"), "Rotation (3, 3) about `vector` by its length [rad].");
 }
 
+// For tools/stubs.sh, which writes Python's keywords of the planners from these tables.
+void bind_tables(py::module_& m) {
+  m.def(
+      "planner_options",
+      [] {
+        py::typing::Dict<py::str, py::object> out;
+        out["TimeOptimalOptions"] = table_of<planning::TimeOptimalOptions>();
+        out["GradientOptions"] = table_of<planning::GradientOptions>();
+        out["StochasticOptions"] = table_of<planning::StochasticOptions>();
+        out["CartOptions"] = table_of<planning::CartOptions>();
+        out["PlaneCartOptions"] = table_of<planning::PlaneCartOptions>();
+        return out;
+      },
+      "The planners' options by the name of their struct: a tuple (name, type, default, doc) for each keyword.");
+}
+
 }  // namespace sigmaik::bindings
 
 PYBIND11_MODULE(_core, m) {
@@ -70,6 +87,8 @@ PYBIND11_MODULE(_core, m) {
   bind_trajectory(m);
   bind_joint_cost(m);
   bind_obstacles(m);
-  bind_planning(m);
+  bind_support_states(m);
+  bind_time_optimal(m);
   bind_cart(m);
+  bind_tables(m);
 }

@@ -1,9 +1,11 @@
 #!/usr/bin/env bash
-# Writes python/sigmaik/_core.pyi and _rules.py from the module installed in .venv, or with --check compares them.
+# Writes python/sigmaik/_core.pyi, _rules.py and planning/_options.py from the module installed in .venv, or with --check
+# compares them.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 out=build/stubs
 rm -rf "$out"
+mkdir -p "$out/sigmaik/planning"
 .venv/bin/python -m pybind11_stubgen sigmaik._core --output-dir "$out" --exit-code
 
 # What pybind11-stubgen does not know: how a stub spells the members of an enum, that an enum's methods are Enum's (and
@@ -27,7 +29,23 @@ print("from ._core import (", *(f"    {name}," for name in names), ")", "", sep=
 print("__all__ = [", *(f'    "{name}",' for name in names), "]", sep="\n")
 EOF
 
-for file in _core.pyi _rules.py; do
+.venv/bin/python - > "$out/sigmaik/planning/_options.py" <<'EOF'
+import textwrap
+
+from sigmaik import _core
+
+print('"""The planners\' options by keyword, as the C++ structs of the same names have them. Written by `make stubs`."""\n')
+print("from __future__ import annotations\n\nimport typing\n\nimport numpy.typing\n")
+tables = _core.planner_options()
+print("__all__ = [", *(f'    "{name}",' for name in tables), "]", sep="\n")
+for name, table in tables.items():
+    print(f'\n\nclass {name}(typing.TypedDict, total=False):\n    """Each option that is left out has its default."""\n')
+    for keyword, annotation, default, doc in table:
+        text = textwrap.fill(f'"""{doc} Default: {default}."""', 116)
+        print(textwrap.indent(f"{keyword}: {annotation}\n{text}", "    "))
+EOF
+
+for file in _core.pyi _rules.py planning/_options.py; do
   if [[ ${1:-} != --check ]]; then
     cp "$out/sigmaik/$file" "python/sigmaik/$file"
   elif ! diff -u "python/sigmaik/$file" "$out/sigmaik/$file"; then

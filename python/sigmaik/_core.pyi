@@ -10,7 +10,7 @@ import os
 import pathlib
 import sigmaik.planning.status
 import typing
-__all__: list[str] = ['AdaptiveDampedLeastSquares', 'AnalyticBranch', 'AnalyticIk', 'ArgumentError', 'ArmSpheres', 'CartError', 'CartMeasures', 'CartMotion', 'CartRegion', 'Chain', 'Clearance', 'ComputedTorque', 'ComputedTorqueStep', 'ConstrainedIk', 'ConstrainedIkStep', 'Crossing', 'DEFAULT_SCALE', 'DampedLeastSquares', 'DistanceField', 'Dynamics', 'Error', 'Inertia', 'JParse', 'JacobianProjection', 'JacobianSafety', 'JacobianSafetyProjection', 'JointCost', 'JointLimits', 'LeastSquaresSolution', 'LoopCommand', 'LoopStatistics', 'Method', 'ModelWarning', 'PlaneCartMotion', 'Playback', 'PseudoInverse', 'SampleCounts', 'SampleStatus', 'Segment', 'SelectivelyDampedLeastSquares', 'Servo', 'ServoLoop', 'ServoStep', 'SingularSets', 'Solution', 'Spectrum', 'Status', 'StreamStatus', 'SupportPlanner', 'SupportStates', 'Target', 'TargetStream', 'TimeOptimal', 'TimeOptimalResult', 'Trajectory', 'VelocitySolver', 'admissible_guess', 'cart_descent', 'cart_motion', 'cart_motion_by_descent', 'clearance', 'collision_cost', 'evaluate_cart_motion', 'evaluate_cart_motion_plane', 'evaluate_index', 'forbidden_intervals', 'geometry_aware_cost', 'index_of_jacobian', 'joint_limit_cost', 'known_singular_sets', 'least_squares', 'load_singular_sets', 'log_manipulability_cost', 'manipulability_cost', 'min_distance', 'plane_cart_motion', 'play', 'pose_error', 'potential_cost', 'reference_scale', 'rotation_exp', 'rotation_log', 'rules', 'scaled_cost', 'self_collision_cost', 'self_collision_pairs', 'singular_sets_of', 'solve_batch', 'spline_velocities', 'sum_of_costs', 'taut_string']
+__all__: list[str] = ['AdaptiveDampedLeastSquares', 'AnalyticBranch', 'AnalyticIk', 'ArgumentError', 'ArmSpheres', 'CartError', 'CartMeasures', 'CartMotion', 'CartRegion', 'Chain', 'Clearance', 'ComputedTorque', 'ComputedTorqueStep', 'ConstrainedIk', 'ConstrainedIkStep', 'Crossing', 'DEFAULT_SCALE', 'DampedLeastSquares', 'DistanceField', 'Dynamics', 'Error', 'Inertia', 'JParse', 'JacobianProjection', 'JacobianSafety', 'JacobianSafetyProjection', 'JointCost', 'JointLimits', 'LeastSquaresSolution', 'LoopCommand', 'LoopStatistics', 'Method', 'ModelWarning', 'PlaneCartMotion', 'Playback', 'PseudoInverse', 'SampleCounts', 'SampleStatus', 'Segment', 'SelectivelyDampedLeastSquares', 'Servo', 'ServoLoop', 'ServoStep', 'SingularSets', 'Solution', 'Spectrum', 'Status', 'StreamStatus', 'Target', 'TargetStream', 'TimeOptimal', 'TimeOptimalResult', 'Trajectory', 'VelocitySolver', 'admissible_guess', 'cart_descent', 'cart_motion', 'cart_motion_by_descent', 'clearance', 'collision_cost', 'draw_from_prior', 'evaluate_cart_motion', 'evaluate_cart_motion_plane', 'evaluate_index', 'forbidden_intervals', 'geometry_aware_cost', 'index_of_jacobian', 'joint_limit_cost', 'known_singular_sets', 'least_squares', 'load_singular_sets', 'log_manipulability_cost', 'manipulability_cost', 'min_distance', 'plan_gradient', 'plan_stochastic', 'plane_cart_motion', 'planner_options', 'play', 'pose_error', 'potential_cost', 'reference_scale', 'rotation_exp', 'rotation_log', 'rules', 'scaled_cost', 'self_collision_cost', 'self_collision_pairs', 'singular_sets_of', 'solve_batch', 'spline_velocities', 'sum_of_costs', 'taut_string']
 DEFAULT_SCALE: float = 6.0
 __version__: str
 
@@ -36,6 +36,10 @@ class Status(enum.IntEnum):
     HOLDING = ...
     LIMITED = ...
     OK = ...
+def planner_options() -> dict[str, typing.Any]:
+    """
+    The planners' options by the name of their struct: a tuple (name, type, default, doc) for each keyword.
+    """
 def pose_error(current: typing.Any, target: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
     """
     [e_p; e_o] (6,) that takes `current` to `target` (4×4 poses in one frame).
@@ -1754,6 +1758,63 @@ def play(trajectory: Trajectory, servo: Servo, *, settle: typing.SupportsFloat |
     settle is not finite or negative.
     """
 
+# ---- Joint cost -------------------------------------------------------------------------------------------------------
+class JointCost:
+    """
+    A smooth cost of joint positions, with its derivatives.
+    """
+    def gradients(self, q: numpy.typing.ArrayLike, threads: typing.SupportsInt | typing.SupportsIndex = 1) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Gradients (B, n) at q (B, n), without the GIL.
+        """
+    def model(self, q: numpy.typing.ArrayLike) -> tuple[float, numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
+        """
+        Cost, gradient (n,) and Hessian (n, n) at q (n,).
+        """
+    def value(self, q: numpy.typing.ArrayLike) -> float:
+        """
+        Cost at q (n,).
+        """
+    def values(self, q: numpy.typing.ArrayLike, threads: typing.SupportsInt | typing.SupportsIndex = 1) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Costs (B,) at q (B, n), without the GIL.
+        """
+    @property
+    def dof(self) -> int:
+        """
+        Number of joints, n.
+        """
+def geometry_aware_cost(chain: Chain, k: typing.SupportsFloat | typing.SupportsIndex, weight: typing.SupportsFloat | typing.SupportsIndex) -> JointCost:
+    """
+    weight · ξ(q), the geometry-aware index, cut off at 2000.
+    """
+def log_manipulability_cost(chain: Chain, weight: typing.SupportsFloat | typing.SupportsIndex) -> JointCost:
+    """
+    −weight · log m(q), m no less than 1e-9.
+    """
+@typing.overload
+def manipulability_cost(sets: SingularSets, weight: typing.SupportsFloat | typing.SupportsIndex, epsilon: typing.SupportsFloat | typing.SupportsIndex) -> JointCost:
+    """
+    weight/(m(q) + ε), m in closed form.
+    """
+@typing.overload
+def manipulability_cost(chain: Chain, weight: typing.SupportsFloat | typing.SupportsIndex, epsilon: typing.SupportsFloat | typing.SupportsIndex) -> JointCost:
+    """
+    weight/(m(q) + ε), m from the Jacobian.
+    """
+def potential_cost(sets: SingularSets, weight: typing.SupportsFloat | typing.SupportsIndex, eta1: typing.SupportsFloat | typing.SupportsIndex, eta2: typing.SupportsFloat | typing.SupportsIndex) -> JointCost:
+    """
+    weight · Σ_i exp(η₁ − η₂ ψ_i(q)).
+    """
+def scaled_cost(factor: typing.SupportsFloat | typing.SupportsIndex, cost: JointCost) -> JointCost:
+    """
+    factor · cost.
+    """
+def sum_of_costs(costs: collections.abc.Sequence[JointCost]) -> JointCost:
+    """
+    Σ of costs for the same joints.
+    """
+
 # ---- Obstacles --------------------------------------------------------------------------------------------------------
 class DistanceField:
     """
@@ -1872,81 +1933,50 @@ def self_collision_pairs(spheres: ArmSpheres, clearance: typing.SupportsFloat | 
     ms.
     """
 
-# ---- Planning ---------------------------------------------------------------------------------------------------------
-class JointCost:
+# ---- Support states ---------------------------------------------------------------------------------------------------
+def draw_from_prior(chain: Chain, cost: JointCost, states: typing.SupportsInt | typing.SupportsIndex, start: numpy.typing.ArrayLike, goal: numpy.typing.ArrayLike, *, deviation: typing.SupportsFloat | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.float64]:
     """
-    A smooth cost of joint positions, with its derivatives.
+    q (states, n) of a motion from the prior about the straight line: a first guess of the planner with this cost.
     """
-    def gradients(self, q: numpy.typing.ArrayLike, threads: typing.SupportsInt | typing.SupportsIndex = 1) -> numpy.typing.NDArray[numpy.float64]:
-        """
-        Gradients (B, n) at q (B, n), without the GIL.
-        """
-    def model(self, q: numpy.typing.ArrayLike) -> tuple[float, numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
-        """
-        Cost, gradient (n,) and Hessian (n, n) at q (n,).
-        """
-    def value(self, q: numpy.typing.ArrayLike) -> float:
-        """
-        Cost at q (n,).
-        """
-    def values(self, q: numpy.typing.ArrayLike, threads: typing.SupportsInt | typing.SupportsIndex = 1) -> numpy.typing.NDArray[numpy.float64]:
-        """
-        Costs (B,) at q (B, n), without the GIL.
-        """
-    @property
-    def dof(self) -> int:
-        """
-        Number of joints, n.
-        """
-class SupportStates:
+def plan_gradient(chain: Chain, start: numpy.typing.ArrayLike, goal: numpy.typing.ArrayLike, python_costs: collections.abc.Sequence[typing.Any], cost: JointCost | None = None, spheres: ArmSpheres | None = None, field: DistanceField | None = None, *, states: typing.SupportsInt | typing.SupportsIndex = 21, prior_weight: typing.SupportsFloat | typing.SupportsIndex = 10.0, max_iterations: typing.SupportsInt | typing.SupportsIndex = 100, tolerance: typing.SupportsFloat | typing.SupportsIndex = 0.0001, restarts: typing.SupportsInt | typing.SupportsIndex = 8, duration: typing.SupportsFloat | typing.SupportsIndex | None = None) -> Trajectory:
     """
-    Answer of SupportPlanner.
-    """
-    def states(self, dof: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.float64]:
-        """
-        q (states, n).
-        """
-    @property
-    def converged(self) -> bool:
-        """
-        Whether it stopped by its own rule.
-        """
-    @property
-    def cost(self) -> float:
-        """
-        Σ of the states' cost, but for the ends'.
-        """
-    @property
-    def distance(self) -> float:
-        """
-        ‖q − μ‖² in the inverse of the prior's covariance.
-        """
-    @property
-    def iterations(self) -> int:
-        ...
-class SupportPlanner:
-    """
-    Motions as support states under a Gaussian-process prior (Petrović et al.).
-    `sigmaik.planning.stochastic` and `gradient` are what to call.
-    """
-    def __init__(self, chain: Chain, cost: JointCost | None, states: typing.SupportsInt | typing.SupportsIndex, python_costs: collections.abc.Sequence[typing.Any] = [], spheres: ArmSpheres | None = None, field: DistanceField | None = None) -> None:
-        """
-        `cost` and those of `python_costs` (value(q: (B, n)) -> (B,), gradient or not) are added up.
+    `sigmaik.planning.gradient` is what to call.
 
-        Raises Error where there is none, or one is not a cost of this chain's joints.
-        """
-    def draw(self, start: numpy.typing.ArrayLike, goal: numpy.typing.ArrayLike, *, deviation: typing.SupportsFloat | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> SupportStates:
-        """
-        A motion from the prior about the straight line: a first guess.
-        """
-    def gradient(self, start: numpy.typing.ArrayLike, goal: numpy.typing.ArrayLike, *, prior_weight: typing.SupportsFloat | typing.SupportsIndex, max_iterations: typing.SupportsInt | typing.SupportsIndex, tolerance: typing.SupportsFloat | typing.SupportsIndex, guess: SupportStates | None = None) -> SupportStates:
-        ...
-    def plan_gradient(self, start: numpy.typing.ArrayLike, goal: numpy.typing.ArrayLike, *, prior_weight: typing.SupportsFloat | typing.SupportsIndex = 10.0, max_iterations: typing.SupportsInt | typing.SupportsIndex = 100, tolerance: typing.SupportsFloat | typing.SupportsIndex = 0.0001, restarts: typing.SupportsInt | typing.SupportsIndex = 8, duration: typing.SupportsFloat | typing.SupportsIndex | None = None) -> Trajectory:
-        ...
-    def plan_stochastic(self, start: numpy.typing.ArrayLike, goal: numpy.typing.ArrayLike, *, samples: typing.SupportsInt | typing.SupportsIndex = 10, max_iterations: typing.SupportsInt | typing.SupportsIndex = 30, deviation: typing.SupportsFloat | typing.SupportsIndex = 0.5, decay: typing.SupportsFloat | typing.SupportsIndex = 0.98, temperature: typing.SupportsFloat | typing.SupportsIndex = 0.1, prior_weight: typing.SupportsFloat | typing.SupportsIndex = 10.0, tolerance: typing.SupportsFloat | typing.SupportsIndex = 0.001, seed: typing.SupportsInt | typing.SupportsIndex = 0, refine: bool = False, duration: typing.SupportsFloat | typing.SupportsIndex | None = None) -> Trajectory:
-        ...
-    def stochastic(self, start: numpy.typing.ArrayLike, goal: numpy.typing.ArrayLike, *, samples: typing.SupportsInt | typing.SupportsIndex, max_iterations: typing.SupportsInt | typing.SupportsIndex, deviation: typing.SupportsFloat | typing.SupportsIndex, decay: typing.SupportsFloat | typing.SupportsIndex, temperature: typing.SupportsFloat | typing.SupportsIndex, prior_weight: typing.SupportsFloat | typing.SupportsIndex, tolerance: typing.SupportsFloat | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> SupportStates:
-        ...
+    python_costs: added up to `cost`, each with value(q: (B, n)) -> (B,), and a gradient or not.
+    states: N + 1, 3 to 1000 support states, ends included.
+    prior_weight: > 0, of ‖q − μ‖² against the cost.
+    max_iterations: ≥ 1.
+    tolerance: ≥ 0: the search stops where an iteration gains less than this part of the objective.
+    restarts: ≥ 0. Where the motion found from the straight line touches an obstacle, so many other
+        motions are found from first guesses drawn from the prior, the same each time, with a standard
+        deviation of 0.5 rad or m half-way. The motion of least cost that touches no obstacle is the
+        answer.
+    duration: [s] > 0. None: the shortest that keeps the limits of velocity and acceleration, 1 s where
+        there are none.
+    """
+def plan_stochastic(chain: Chain, start: numpy.typing.ArrayLike, goal: numpy.typing.ArrayLike, python_costs: collections.abc.Sequence[typing.Any], cost: JointCost | None = None, spheres: ArmSpheres | None = None, field: DistanceField | None = None, seed: typing.SupportsInt | typing.SupportsIndex | None = None, *, states: typing.SupportsInt | typing.SupportsIndex = 21, samples: typing.SupportsInt | typing.SupportsIndex = 10, max_iterations: typing.SupportsInt | typing.SupportsIndex = 30, deviation: typing.SupportsFloat | typing.SupportsIndex = 0.5, decay: typing.SupportsFloat | typing.SupportsIndex = 0.98, temperature: typing.SupportsFloat | typing.SupportsIndex = 0.1, prior_weight: typing.SupportsFloat | typing.SupportsIndex = 10.0, tolerance: typing.SupportsFloat | typing.SupportsIndex = 0.001, refine: bool = False, duration: typing.SupportsFloat | typing.SupportsIndex | None = None) -> Trajectory:
+    """
+    `sigmaik.planning.stochastic` is what to call.
+
+    python_costs: added up to `cost`, each with value(q: (B, n)) -> (B,), and a gradient or not.
+    states: N + 1, 3 to 1000 support states, ends included.
+    samples: ≥ 2, motions drawn in an iteration.
+    max_iterations: ≥ 1.
+    deviation: [rad or m] > 0, standard deviation of the samples half-way.
+    decay: in (0, 1], of the deviation from one iteration to the next.
+    temperature: > 0: a sample weighs exp(−(G − G_min)/(temperature (G_max − G_min))).
+    prior_weight: ≥ 0, of ‖q − μ‖² against the cost.
+    tolerance: ≥ 0: the search stops where eight iterations together gain less than this part of the
+        objective.
+    refine: whether `gradient` finishes the motion that the samples found.
+    duration: [s] as for `gradient`.
+    """
+def spline_velocities(q: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Velocities (states, n) of the natural cubic spline through q (states, n), in unit time.
+    """
+
+# ---- Time optimal -----------------------------------------------------------------------------------------------------
 class TimeOptimalResult:
     """
     Answer of TimeOptimal.solve().
@@ -1990,9 +2020,21 @@ class TimeOptimal:
     Time-optimal motions of one arm with one cost, after Beck et al. (2022), by an interior-point
     method made for double integrators. `sigmaik.planning.time_optimal` is what to call.
     """
-    def __init__(self, chain: Chain, cost: JointCost | None, *, nodes: typing.SupportsInt | typing.SupportsIndex = 30, time_weight: typing.SupportsFloat | typing.SupportsIndex = 1.0, effort_weight: typing.SupportsFloat | typing.SupportsIndex = 1.0, tolerance: typing.SupportsFloat | typing.SupportsIndex = 1e-09, max_iterations: typing.SupportsInt | typing.SupportsIndex = 500, between_nodes: bool = True, restarts: bool = True, clearance_width: typing.SupportsFloat | typing.SupportsIndex = 400.0, sets: SingularSets | None = None, spheres: ArmSpheres | None = None, field: DistanceField | None = None) -> None:
+    def __init__(self, chain: Chain, cost: JointCost | None = None, sets: SingularSets | None = None, spheres: ArmSpheres | None = None, field: DistanceField | None = None, *, nodes: typing.SupportsInt | typing.SupportsIndex = 30, time_weight: typing.SupportsFloat | typing.SupportsIndex = 1.0, effort_weight: typing.SupportsFloat | typing.SupportsIndex = 1.0, tolerance: typing.SupportsFloat | typing.SupportsIndex = 1e-09, max_iterations: typing.SupportsInt | typing.SupportsIndex = 500, between_nodes: bool = True, restarts: bool = True, clearance_width: typing.SupportsFloat | typing.SupportsIndex = 400.0) -> None:
         """
         Raises Error where an option is out of its range.
+
+        nodes: N, 5 to 10 000.
+        time_weight: [1/s] > 0.
+        effort_weight: [s⁴/rad²] ≥ 0, and > 0 where a joint has no acceleration limit.
+        tolerance: in [1e-12, 1e-2], what is left to gain, as a part of the objective between the ends.
+        max_iterations: ≥ 1, Newton steps of a start.
+        between_nodes: whether the motion keeps the position limits between the nodes too, where a parabola
+            can overshoot. False: at the nodes alone, as in the paper.
+        restarts: whether the planner also searches on the other sides, where the motion found still leads
+            through what the cost marks.
+        clearance_width: [1/rad²] > 0: sets of codimension above 1 count as crossed where ψ < 1/(2
+            clearance_width). Where a call has eta2, its default is eta2.
         """
     def plan(self, start: numpy.typing.ArrayLike, goal: numpy.typing.ArrayLike, start_velocity: numpy.typing.ArrayLike | None = None, goal_velocity: numpy.typing.ArrayLike | None = None) -> Trajectory:
         """
@@ -2005,40 +2047,6 @@ class TimeOptimal:
 
         Raises Error where an end is outside its limits. One call at a time for each object.
         """
-def geometry_aware_cost(chain: Chain, k: typing.SupportsFloat | typing.SupportsIndex, weight: typing.SupportsFloat | typing.SupportsIndex) -> JointCost:
-    """
-    weight · ξ(q), the geometry-aware index, cut off at 2000.
-    """
-def log_manipulability_cost(chain: Chain, weight: typing.SupportsFloat | typing.SupportsIndex) -> JointCost:
-    """
-    −weight · log m(q), m no less than 1e-9.
-    """
-@typing.overload
-def manipulability_cost(sets: SingularSets, weight: typing.SupportsFloat | typing.SupportsIndex, epsilon: typing.SupportsFloat | typing.SupportsIndex) -> JointCost:
-    """
-    weight/(m(q) + ε), m in closed form.
-    """
-@typing.overload
-def manipulability_cost(chain: Chain, weight: typing.SupportsFloat | typing.SupportsIndex, epsilon: typing.SupportsFloat | typing.SupportsIndex) -> JointCost:
-    """
-    weight/(m(q) + ε), m from the Jacobian.
-    """
-def potential_cost(sets: SingularSets, weight: typing.SupportsFloat | typing.SupportsIndex, eta1: typing.SupportsFloat | typing.SupportsIndex, eta2: typing.SupportsFloat | typing.SupportsIndex) -> JointCost:
-    """
-    weight · Σ_i exp(η₁ − η₂ ψ_i(q)).
-    """
-def scaled_cost(factor: typing.SupportsFloat | typing.SupportsIndex, cost: JointCost) -> JointCost:
-    """
-    factor · cost.
-    """
-def spline_velocities(q: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
-    """
-    Velocities (states, n) of the natural cubic spline through q (states, n), in unit time.
-    """
-def sum_of_costs(costs: collections.abc.Sequence[JointCost]) -> JointCost:
-    """
-    Σ of costs for the same joints.
-    """
 
 # ---- Cart -------------------------------------------------------------------------------------------------------------
 class CartError(Error):
@@ -2245,17 +2253,47 @@ class PlaneCartMotion(CartMeasures):
         """
         (M, 2) [m] of the cart.
         """
-def admissible_guess(flange_xy: numpy.typing.ArrayLike, start: typing.SupportsFloat | typing.SupportsIndex, end: typing.SupportsFloat | typing.SupportsIndex, radius: typing.SupportsFloat | typing.SupportsIndex, *, lower: typing.SupportsFloat | typing.SupportsIndex = ..., upper: typing.SupportsFloat | typing.SupportsIndex = ..., margin: typing.SupportsFloat | typing.SupportsIndex = 0.0, turn: typing.SupportsFloat | typing.SupportsIndex | None = None, duration: typing.SupportsFloat | typing.SupportsIndex = 1.0, max_speed: typing.SupportsFloat | typing.SupportsIndex = ..., max_acceleration: typing.SupportsFloat | typing.SupportsIndex = ..., at_rest: bool = False) -> numpy.typing.NDArray[numpy.float64]:
+def admissible_guess(flange_xy: numpy.typing.ArrayLike, start: typing.SupportsFloat | typing.SupportsIndex, end: typing.SupportsFloat | typing.SupportsIndex, radius: typing.SupportsFloat | typing.SupportsIndex, lower: typing.SupportsFloat | typing.SupportsIndex, upper: typing.SupportsFloat | typing.SupportsIndex, *, turn: typing.SupportsFloat | typing.SupportsIndex | None = None, margin: typing.SupportsFloat | typing.SupportsIndex = 0.0, duration: typing.SupportsFloat | typing.SupportsIndex = 1.0, max_speed: typing.SupportsFloat | typing.SupportsIndex = ..., max_acceleration: typing.SupportsFloat | typing.SupportsIndex = ..., at_rest: bool = False) -> numpy.typing.NDArray[numpy.float64]:
     """
     A first guess (M,) of the descent that jumps past the forbidden region, on the sides of the exact law.
+
+    lower: [m] of the cart's range.
+    upper: [m] of the cart's range.
+    turn: [rad] that joint 1 turns through from the first to the last sample. Laws that turn the point's
+        azimuth by another number of whole turns are left out: they would bring the arm to its last
+        pose, but not to its taught joints. None: the winding is not checked.
+    margin: [m] ≥ 0, added to the radius in planning. Between samples the law can be nearer than radius
+        + margin by max|Δ²λ|/8.
+    duration: [s] > 0 from the first to the last sample. The limits count in it.
+    max_speed: [m/s] > 0 of the cart. A law within the speed limit is found if there is one.
+    max_acceleration: [m/s²] > 0 of the cart, second differences over the samples. Where the law of the
+        least energy accelerates too much, the law of the least energy that does not takes its place, on
+        the same sides, by an interior-point method; other sides are not tried.
+    at_rest: whether the cart starts and stops within max_acceleration, where max_acceleration is
+        finite.
     """
 def cart_descent(lower: numpy.typing.ArrayLike, upper: numpy.typing.ArrayLike, guess: numpy.typing.ArrayLike, alpha: typing.SupportsFloat | typing.SupportsIndex, step: typing.SupportsFloat | typing.SupportsIndex, max_iterations: typing.SupportsInt | typing.SupportsIndex, until_admissible: bool) -> tuple[numpy.typing.NDArray[numpy.float64], int]:
     """
     Gradient descent (10) from a guess (M,) [m]: the law and the number of iterations.
     """
-def cart_motion(flange_xy: numpy.typing.ArrayLike, start: typing.SupportsFloat | typing.SupportsIndex, end: typing.SupportsFloat | typing.SupportsIndex, radius: typing.SupportsFloat | typing.SupportsIndex, *, lower: typing.SupportsFloat | typing.SupportsIndex = ..., upper: typing.SupportsFloat | typing.SupportsIndex = ..., margin: typing.SupportsFloat | typing.SupportsIndex = 0.0, turn: typing.SupportsFloat | typing.SupportsIndex | None = None, duration: typing.SupportsFloat | typing.SupportsIndex = 1.0, max_speed: typing.SupportsFloat | typing.SupportsIndex = ..., max_acceleration: typing.SupportsFloat | typing.SupportsIndex = ..., at_rest: bool = False) -> CartMotion:
+def cart_motion(flange_xy: numpy.typing.ArrayLike, start: typing.SupportsFloat | typing.SupportsIndex, end: typing.SupportsFloat | typing.SupportsIndex, radius: typing.SupportsFloat | typing.SupportsIndex, lower: typing.SupportsFloat | typing.SupportsIndex, upper: typing.SupportsFloat | typing.SupportsIndex, *, turn: typing.SupportsFloat | typing.SupportsIndex | None = None, margin: typing.SupportsFloat | typing.SupportsIndex = 0.0, duration: typing.SupportsFloat | typing.SupportsIndex = 1.0, max_speed: typing.SupportsFloat | typing.SupportsIndex = ..., max_acceleration: typing.SupportsFloat | typing.SupportsIndex = ..., at_rest: bool = False) -> CartMotion:
     """
     The exact law. `sigmaik.planning.cart_motion` is what to call.
+
+    lower: [m] of the cart's range.
+    upper: [m] of the cart's range.
+    turn: [rad] that joint 1 turns through from the first to the last sample. Laws that turn the point's
+        azimuth by another number of whole turns are left out: they would bring the arm to its last
+        pose, but not to its taught joints. None: the winding is not checked.
+    margin: [m] ≥ 0, added to the radius in planning. Between samples the law can be nearer than radius
+        + margin by max|Δ²λ|/8.
+    duration: [s] > 0 from the first to the last sample. The limits count in it.
+    max_speed: [m/s] > 0 of the cart. A law within the speed limit is found if there is one.
+    max_acceleration: [m/s²] > 0 of the cart, second differences over the samples. Where the law of the
+        least energy accelerates too much, the law of the least energy that does not takes its place, on
+        the same sides, by an interior-point method; other sides are not tried.
+    at_rest: whether the cart starts and stops within max_acceleration, where max_acceleration is
+        finite.
     """
 def cart_motion_by_descent(flange_xy: numpy.typing.ArrayLike, start: typing.SupportsFloat | typing.SupportsIndex, end: typing.SupportsFloat | typing.SupportsIndex, radius: typing.SupportsFloat | typing.SupportsIndex, *, alpha: typing.SupportsFloat | typing.SupportsIndex, step: typing.SupportsFloat | typing.SupportsIndex, max_iterations: typing.SupportsInt | typing.SupportsIndex, guess: numpy.typing.ArrayLike | None = None, margin: typing.SupportsFloat | typing.SupportsIndex = 0.0, duration: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> CartMotion:
     """
@@ -2273,9 +2311,26 @@ def forbidden_intervals(flange_xy: numpy.typing.ArrayLike, radius: typing.Suppor
     """
     λ−, λ+ (M,) [m]; ∞ and −∞ where nothing is forbidden.
     """
-def plane_cart_motion(flange_xy: numpy.typing.ArrayLike, start: numpy.typing.ArrayLike, end: numpy.typing.ArrayLike, radius: typing.SupportsFloat | typing.SupportsIndex, *, lower: numpy.typing.ArrayLike, upper: numpy.typing.ArrayLike, margin: typing.SupportsFloat | typing.SupportsIndex = 0.0, max_radius: typing.SupportsFloat | typing.SupportsIndex = ..., turn: typing.SupportsFloat | typing.SupportsIndex | None = None, duration: typing.SupportsFloat | typing.SupportsIndex = 1.0, max_speed: numpy.typing.ArrayLike = ..., max_acceleration: numpy.typing.ArrayLike = ..., at_rest: bool = False) -> PlaneCartMotion:
+def plane_cart_motion(flange_xy: numpy.typing.ArrayLike, start: numpy.typing.ArrayLike, end: numpy.typing.ArrayLike, radius: typing.SupportsFloat | typing.SupportsIndex, lower: numpy.typing.ArrayLike, upper: numpy.typing.ArrayLike, *, turn: typing.SupportsFloat | typing.SupportsIndex | None = None, max_radius: typing.SupportsFloat | typing.SupportsIndex = ..., margin: typing.SupportsFloat | typing.SupportsIndex = 0.0, duration: typing.SupportsFloat | typing.SupportsIndex = 1.0, max_speed: numpy.typing.ArrayLike = ..., max_acceleration: numpy.typing.ArrayLike = ..., at_rest: bool = False) -> PlaneCartMotion:
     """
     The motion with two axes. `sigmaik.planning.cart_motion_plane` is what to call.
+
+    lower: (2,) [m] of the axes' ranges.
+    upper: (2,) [m] of the axes' ranges.
+    turn: [rad] that joint 1 turns through. Motions that turn the point's azimuth by another number of
+        whole turns are left out: they would not bring the arm to its taught joints. None: the winding
+        is free.
+    max_radius: [m] > radius + margin: the arm's reach, the farthest that the point may be from axis 1.
+    margin: [m] ≥ 0, added to the radius in planning. Between samples the point can be nearer than
+        radius + margin by (r/8) of the square of the angle by which a step turns the point; `clearance`
+        tells.
+    duration: [s] > 0 from the first to the last sample. The limits count in it.
+    max_speed: [m/s] > 0 of each axis, one number for both or (2,).
+    max_acceleration: [m/s²] > 0 of each axis, second differences over the samples. Where the best
+        motion does not keep to the limits, the motion of the least energy that does takes its place,
+        along the same way.
+    at_rest: whether the cart starts and stops within max_acceleration, where max_acceleration is
+        finite.
     """
 def taut_string(at: numpy.typing.ArrayLike, lower: numpy.typing.ArrayLike, upper: numpy.typing.ArrayLike) -> tuple[numpy.typing.NDArray[numpy.float64], list[int]]:
     """

@@ -37,7 +37,7 @@ def ball():
 
 
 class NearHome:
-    """All that a cost of a user's own takes."""
+    """The smallest cost of a user's own."""
 
     def value(self, q):
         return 0.5 * np.sum(q**2, axis=1)
@@ -126,7 +126,7 @@ def test_options_are_one_object_or_keywords(arm, ends):
     for planner in (sk.planning.time_optimal, sk.planning.gradient, sk.planning.stochastic):
         with pytest.raises(TypeError, match=r"has no option 'weights'; it has .*max_iterations"):
             planner(arm, start, goal, weights=1.0)
-    with pytest.raises(TypeError, match="has no option 'rang'; it has turn, cart_range"):
+    with pytest.raises(TypeError, match=r"has no option 'rang'; it has turn, .*cart_range"):
         sk.planning.cart_motion(np.zeros((3, 2)), 1.0, 1.0, 0.2, rang=(0, 1))
 
 

@@ -242,7 +242,7 @@ def test_what_touches_is_refused_or_fails(table):
     for planner in PLANNERS:
         with pytest.raises(ValueError, match="the goal is in collision"):
             planner(arm, start, inside, obstacles, spheres=spheres)
-    # Where obstacles cost next to nothing, the motion goes through: then there is none.
+    # Where obstacles cost almost nothing, the motion goes through an obstacle, and the plan has failed.
     for start, goal in tasks:
         line = start + np.linspace(0, 1, 200)[:, None] * (goal - start)
         if np.min(sk.planning.min_distance(spheres, obstacles, line)) > -0.02:
@@ -272,7 +272,7 @@ def test_restarts_where_the_straight_line_leads_into_an_obstacle(table):
         assert np.min(sk.planning.min_distance(spheres, obstacles, q)) > -1e-3
         if once.status == "failed":
             stuck += 1
-            # More of them are no worse.
+            # More restarts give no worse plan.
             few = sk.planning.gradient(arm, start, goal, obstacles, spheres=spheres, restarts=4)
             assert few.status == "failed" or plan.cost <= few.cost
         else:
@@ -286,19 +286,23 @@ def test_first_guesses_are_from_the_prior():
     arm, tasks = pairs("ur10", 1)
     start, goal = tasks[0]
     start, goal = 0.1 * start, 0.1 * goal  # far from limits
-    planner = _core.SupportPlanner(arm, _core.geometry_aware_cost(arm, 6.0, 1.0), 11)
+    cost = _core.geometry_aware_cost(arm, 6.0, 1.0)
     line = np.linspace(start, goal, 11)
-    drawn = [planner.draw(start, goal, deviation=0.5, seed=seed) for seed in range(4000)]
-    off = np.array([guess.states(6) - line for guess in drawn])
+
+    def draw(deviation, seed):
+        return _core.draw_from_prior(arm, cost, 11, start, goal, deviation=deviation, seed=seed)
+
+    drawn = [draw(0.5, seed) for seed in range(4000)]
+    off = np.array(drawn) - line
     assert np.all(off[:, [0, -1]] == 0.0)
     off = off[:, 1:-1].transpose(0, 2, 1).reshape(-1, 9)
     # A covariance of 24 000 draws is known to 1 % of the variances, 0.25 at most; joints are independent, so are seeds.
     assert off.T @ off / len(off) == pytest.approx(0.25 * covariance(11), abs=0.25 * 0.05)
     assert np.mean(off, axis=0) == pytest.approx(np.zeros(9), abs=0.02)
-    assert np.array_equal(planner.draw(start, goal, deviation=0.5, seed=7).states(6), drawn[7].states(6))
-    assert planner.draw(start, goal, deviation=0.0, seed=0).states(6) == pytest.approx(line)
+    assert np.array_equal(draw(0.5, 7), drawn[7])
+    assert draw(0.0, 0) == pytest.approx(line)
     with pytest.raises(sk.Error, match="deviation"):
-        planner.draw(start, goal, deviation=-1.0, seed=0)
+        draw(-1.0, 0)
 
 
 def test_self_collision_may_be_switched_on():

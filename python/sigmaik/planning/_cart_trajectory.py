@@ -27,31 +27,30 @@ Shape = Literal["line", "spline"]
 Profile = Literal["constant", "smooth"]
 
 TIGHT = 1e-11
-"""[m or rad] to which inverse kinematics reaches a pose."""
+"""[m or rad] Tolerance of the poses that inverse kinematics reaches."""
 LEAP = 0.1
-"""[rad] that a joint may move in one step of inverse kinematics; where it would be more, the step is halved."""
+"""[rad] Largest motion of a joint in one step of inverse kinematics; a step with a larger motion is halved."""
 HALVINGS = 14
 SMOOTH_SPEED = 1.875
-"""Top speed of `smooth`, of the mean."""
+"""Top speed of `smooth`, as a multiple of its mean speed."""
 
 
 @dataclass(frozen=True)
 class ShoulderCylinder:
-    """Where a six-axis arm has its shoulder singularity: a point of its hand is as near the first axis as it can be."""
+    """The shoulder singularity of a six-axis arm: a point of the hand is at its least distance from the first axis."""
 
     point: Array
     """(3,) [m] in the tip's frame, where axes 5 and 6 meet."""
     radius: float
-    """[m] from the first axis, the least that the arm can reach, and singular there."""
+    """[m] Least distance of the point from the first axis, at which the arm is singular."""
 
 
 def shoulder_cylinder(chain: Chain) -> ShoulderCylinder:
-    """The point and the radius that make a shoulder singularity a cylinder about axis 1, whatever the orientation.
+    """The point and the radius that make a shoulder singularity a cylinder about axis 1, for every orientation.
 
-    Where axes 5 and 6 meet, the point moves in a plane at right angles to axis 2, which is at a fixed distance d from
-    axis 1: its distance from axis 1 is √(g² + d²), and the arm is singular where g = 0. For a Universal Robots arm, d =
-    d4 and
-    |det J| = a2 a3 |s3 s5 g|. For arms with a spherical wrist the point is the wrist's centre.
+    The point where axes 5 and 6 meet moves in a plane at right angles to axis 2, at a fixed distance d from axis 1. The
+    distance of the point from axis 1 is √(g² + d²), and the arm is singular where g = 0. For a Universal Robots arm,
+    d = d4 and |det J| = a2 a3 |s3 s5 g|. For arms with a spherical wrist the point is the wrist's centre.
 
     Raises ValueError where the arm has not six joints, its axes 5 and 6 do not meet, axis 2 is not at right angles to
     axis 1, or the point does not move in such a plane.
@@ -72,7 +71,7 @@ def shoulder_cylinder(chain: Chain) -> ShoulderCylinder:
             raise ValueError("axis 2 is not at right angles to axis 1")
         normal = np.cross(axis[4], axis[5])
         if np.linalg.norm(normal) < 1e-3:
-            continue  # nearly parallel: another q tells more
+            continue  # the axes are nearly parallel: another q gives the point more exactly
         between = near[5] - near[4]
         gap = abs(between @ normal) / np.linalg.norm(normal)
         if gap > 1e-9 * size:
@@ -105,25 +104,25 @@ class CartTrajectory:
     qdot: Array = field(repr=False)
     """(T, 1 + n) [m/s, rad/s], second-order differences."""
     poses: Array = field(repr=False)
-    """(T, 4, 4) of the tool, in the frame along whose x the cart runs."""
+    """(T, 4, 4) of the tool, in a frame whose x axis is the axis of the cart."""
     motions: tuple[CartMotion, ...] = field(repr=False)
     """(N − 1) laws of the cart, each between two taught configurations."""
     taught_at: tuple[int, ...]
     """(N,) samples of the taught configurations."""
     min_singular_value: Array = field(repr=False)
-    """(T,) smallest singular value of the arm's Jacobian, m and rad mixed as they are."""
+    """(T,) smallest singular value of the arm's Jacobian, in m and rad without a length scale."""
     joint_error: float
-    """[rad] by which the arm missed taught joints at most, on arriving; it goes on from where it arrived."""
+    """[rad] Largest deviation from the taught joints on arrival; each motion begins where the last motion arrived."""
 
 
 class CartTrajectoryKeywords(TypedDict, total=False):
     """Options of `cart_trajectory`."""
 
     poses: ArrayLike | None
-    """(N, 4, 4) of the tool where they were taught, x along the cart; by default those of `taught`."""
+    """(N, 4, 4) Taught poses of the tool, x along the cart; by default the poses of `taught`."""
     point: ArrayLike
-    """(3,) [m] of the arm in the tip's frame, that is to stay out of the cylinder. The default, the tip's origin,
-    is the paper's. `shoulder_cylinder(chain)` has the point and the least radius that suit the arm."""
+    """(3,) [m] Point in the tip's frame that has to stay out of the cylinder. The default, the tip's origin, is the
+    paper's. `shoulder_cylinder(chain)` has the point and the least radius that suit the arm."""
     mount: ArrayLike | None
     """(4, 4) base of the chain on the cart, at cart position 0; by default the cart's frame."""
     tool: ArrayLike | None
@@ -131,19 +130,19 @@ class CartTrajectoryKeywords(TypedDict, total=False):
     durations: float | Sequence[float]
     """[s] of each motion, or one for all."""
     samples: int | Sequence[int]
-    """of each motion, its ends among them, or one number for all. Neighbours share a sample."""
+    """Samples of each motion, ends included, or one number for all motions. Neighbours share a sample."""
     shape: Shape
-    """"line"; "spline", one natural cubic spline through all positions."""
+    """"line"; or "spline": one natural cubic spline through all positions."""
     via: Sequence[ArrayLike | None] | None
     """(N − 1) a point (3,) [m] that the motion goes through on a circular arc, or None for a line."""
     profile: Profile
     """"constant" speed along the path, as in the paper; "smooth" from rest to rest, of cart, tool and joints."""
     margin: float
-    """See `cart_motion`. With "smooth" the acceleration is that of the whole motion."""
+    """See `cart_motion`."""
     cart_range: tuple[float, float]
-    """See `cart_motion`. With "smooth" the acceleration is that of the whole motion."""
+    """See `cart_motion`."""
     max_speed: float
-    """See `cart_motion`. With "smooth" the acceleration is that of the whole motion."""
+    """See `cart_motion`."""
     max_acceleration: float
     """See `cart_motion`. With "smooth" the acceleration is that of the whole motion."""
     pose_tolerance: float
@@ -161,8 +160,8 @@ def cart_trajectory(
 
     For each pair of neighbours: the tool's motion p(t); the law of the cart that keeps `point` more than `radius` from
     the first joint's axis, on the side that turns joint 1 as taught (`cart_motion`); the arm's inverse kinematics on
-    p(t) shifted by the cart (9), continuous from the taught start; and a check that it arrives at the taught joints,
-    not at another branch or another turn.
+    p(t) shifted by the cart (9), continuous from the taught start; and a check that the arm arrives at the taught
+    joints, not at another branch or another turn.
 
     Parameters
     ----------
@@ -245,7 +244,7 @@ def _through(
     for k, path in enumerate(paths):
         before, after = configurations[k], configurations[k + 1]
         around = sign * (after[1] - before[1])
-        # The point's azimuth is joint 1 plus what the other joints make of it, which never is a whole turn.
+        # The point's azimuth is joint 1 plus an angle of the other joints, which is never a whole turn.
         rest = azimuth[k + 1] - azimuth[k] - around
         motion = cart_motion(
             (path(np.linspace(0.0, 1.0, counts[k])) @ in_tool)[:, :2] - axis[:2],
@@ -260,7 +259,7 @@ def _through(
             max_acceleration=max_acceleration if profile == "constant" else math.inf,
         )
         warp, when = (smooth, when_smooth) if profile == "smooth" else (_same, _same)
-        # A corner of the law between samples becomes one.
+        # A corner of the law between two samples becomes a sample.
         between = motion.corners[motion.corners % 1.0 != 0.0] / (counts[k] - 1)
         time = np.union1d(np.linspace(0.0, 1.0, counts[k]), when(between))
         joints, reached = follow(chain, _shifted(path, motion, warp, to_base, to_tip), time, rows[-1][-1, 1:])
@@ -293,11 +292,12 @@ def _through(
 
 
 def follow(chain: Chain, pose_at: Callable[[float], Array], times: Array, start: Array) -> tuple[Array, int]:
-    """Joints (K, n) that follow tip poses, continuous from `start`, by Newton's method, and how many times were
-    reached.
+    """Joints (K, n) that follow tip poses, continuous from `start`, by Newton's method, and the number of times that
+    were reached.
 
-    pose_at(t) is the tip's pose (4, 4) in the base. Where a step moves a joint far, or Newton's method does not get
-    there, it is halved, time and again; where that does not help either, what was reached is returned.
+    pose_at(t) is the tip's pose (4, 4) in the base. Where a step moves a joint too far, or Newton's method does not
+    converge, the step is halved up to HALVINGS times; where halving does not help, the function returns the joints that
+    it has reached.
     """
     q = np.array(start, dtype=np.float64)
     found = [q]
@@ -380,8 +380,8 @@ def _least(chain: Chain, q: Array) -> Array:
 
 
 def _rates(t: Array, q: Array, taught_at: list[int]) -> Array:
-    """Differences within each motion: at a taught configuration the rate may jump, and is that of the motion that
-    begins."""
+    """Differences within each motion. At a taught configuration the rate may jump; the rate given there belongs to the
+    motion that begins."""
     out = np.empty_like(q)
     for first, last in zip(taught_at[:-1], taught_at[1:], strict=True):
         part = slice(first, last + 1)
@@ -428,7 +428,7 @@ def _pose(name: str, pose: ArrayLike | None) -> Array:
     if pose is None:
         return np.eye(4)
     out = _array(name, pose, (4, 4))
-    _core.pose_error(out, out)  # refuses what is no pose
+    _core.pose_error(out, out)  # refuses a matrix that is no pose
     return out
 
 

@@ -11,14 +11,15 @@ __all__ = ["BatchCost"]
 
 
 class BatchCost(Protocol):
-    """A smooth cost of joint positions, asked for many at once: what `costs=(…)` of `gradient` and `stochastic` takes.
+    """A smooth cost of joint positions, of many configurations at once, for `costs=(…)` of `gradient` and `stochastic`.
 
-    Any object with `value`; it need not derive from this. With a method ``gradient(q: (B, n)) -> (B, n)`` too it is
-    asked for gradients, else these are central differences with steps of 6e-6 max(1, |q_j|), 2n values a gradient, all
-    in one call. Differences of states on a limit reach beyond it by a step.
+    Any object with `value` is such a cost; its class need not derive from this class. Where the object has a method
+    ``gradient(q: (B, n)) -> (B, n)``, too, planners call this method. Otherwise gradients are central differences with
+    steps of 6e-6 max(1, |q_j|): 2n values for each gradient, all in one call. At a state on a limit these differences
+    ask for values one step beyond the limit.
 
-    q is an array of its own at each call. Planners call without holding locks, but with the GIL, on the thread that
-    asked for the plan; one object for several planning threads must bear that.
+    Each call gets an array q of its own. Planners call without holding locks, but with the GIL, on the thread that
+    asked for the plan; an object that several planning threads share must allow calls from all these threads.
     """
 
     def value(self, q: NDArray[np.float64], /) -> ArrayLike:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Literal, TypedDict
+from typing import TYPE_CHECKING, Literal
 
 from numpy.typing import ArrayLike
 
 from sigmaik import _core
 from sigmaik._core import CartError, CartMotion, CartRegion, Error, evaluate_cart_motion
 
-from .options import checked
+from .options import CartOptions, checked
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -33,28 +33,11 @@ PUBLISHED_ITERATIONS = 53707
 """Of the gradient descent, as in the paper."""
 
 
-class CartKeywords(TypedDict, total=False):
-    """Options of `cart_motion`."""
+class CartKeywords(CartOptions, total=False):
+    """Keywords of `cart_motion`."""
 
-    turn: float | None
-    """[rad] that joint 1 turns through from the first to the last sample. Laws that turn the point's azimuth by another
-    number of whole turns are left out: they would bring the arm to its last pose, but not to its taught joints.
-    None: the winding is not checked. None."""
     cart_range: tuple[float, float]
     """[m] (lowest, highest) position of the cart; unlimited."""
-    margin: float
-    """[m] ≥ 0, added to the radius in planning; 0. Between samples the law can be nearer than radius + margin by
-    max|Δ²λ|/8."""
-    duration: float
-    """[s] > 0 from the first to the last sample; 1. The limits count in it."""
-    max_speed: float
-    """[m/s] of the cart; unlimited. A law within the speed limit is found if there is one."""
-    max_acceleration: float
-    """[m/s²] of the cart, second differences over the samples; unlimited. Where the law of the least energy
-    accelerates too much, the one of the least energy that does not takes its place, on the same sides, by an
-    interior-point method; other sides are not tried."""
-    at_rest: bool
-    """Start and stop within max_acceleration, where that is finite; False."""
     first_guess: Guess | ArrayLike
     """Of the gradient descent: "linear" from start to end; "admissible", a jump past the region and back at the
     end, to the cart's range where it is finite; or (M,) [m]. From an inadmissible guess the descent stops at the
@@ -119,9 +102,9 @@ def cart_motion(
         raise Error(f"method = {method!r} must be 'exact' or 'gradient'")
     first_guess, step = given.pop("first_guess", "linear"), given.pop("step", None)
     most = given.pop("max_iterations", PUBLISHED_ITERATIONS)
-    given["lower"], given["upper"] = given.pop("cart_range", (-math.inf, math.inf))
+    lower, upper = given.pop("cart_range", (-math.inf, math.inf))
     if method == "exact":
-        return _core.cart_motion(flange_xy, start, end, radius, **given)
+        return _core.cart_motion(flange_xy, start, end, radius, lower, upper, **given)
 
     if not (math.isfinite(alpha) and alpha > 0.0):
         raise Error(f"alpha = {alpha} 1/mm² must be finite and greater than 0")
@@ -133,7 +116,7 @@ def cart_motion(
         if first_guess not in ("linear", "admissible"):
             raise Error(f"first_guess = {first_guess!r} must be 'linear', 'admissible' or of shape (M,)")
         if first_guess == "admissible":
-            guess = _core.admissible_guess(flange_xy, start, end, radius, **given)
+            guess = _core.admissible_guess(flange_xy, start, end, radius, lower, upper, **given)
     measured = {name: given[name] for name in ("margin", "duration") if name in given}
     return _core.cart_motion_by_descent(
         flange_xy, start, end, radius, alpha=alpha, step=step, max_iterations=most, guess=guess, **measured

@@ -18,11 +18,11 @@ PosePath = Callable[[Array], Array]
 
 
 def pose_paths(poses: Array, via: Sequence[ArrayLike | None] | None, spline: bool) -> list[PosePath]:
-    """From each of N poses (N, 4, 4) to the next.
+    """The motions from each of N poses (N, 4, 4) to the next pose.
 
-    Positions on a line, or where `via` has a point (3,) [m] on the circular arc through it, at constant speed; or all
-    on one natural cubic spline over chord lengths. Orientations turn about one axis at constant speed, by at most half
-    a turn.
+    Positions move on a line, or where `via` has a point (3,) [m] on the circular arc through this point, at constant
+    speed; with `spline` all positions move on one natural cubic spline over chord lengths. Orientations turn about one
+    axis at constant speed, by at most half a turn.
     """
     count = len(poses) - 1
     if via is not None and len(via) != count:
@@ -82,7 +82,7 @@ def _arc(a: Array, via: ArrayLike | None, b: Array) -> Callable[[Array], Array]:
     centre = a + np.cross(u @ u * v - v @ v * u, normal) / (2.0 * normal @ normal)
     x = a - centre
     y = np.cross(normal / np.linalg.norm(normal), x)
-    # The normal is such that the arc is run through counterclockwise: `via` comes before `b`.
+    # About this normal the arc runs counterclockwise, so that `via` comes before `b`.
     angle = math.atan2((b - centre) @ y, (b - centre) @ x) % (2.0 * math.pi)
     return lambda s: centre + np.cos(angle * s)[:, None] * x + np.sin(angle * s)[:, None] * y
 

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, TypedDict
+from typing import TYPE_CHECKING
 
 from numpy.typing import ArrayLike
 
 from sigmaik import _core
 from sigmaik._core import PlaneCartMotion, evaluate_cart_motion_plane
 
-from .options import checked
+from .options import PlaneCartOptions, checked
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -20,30 +20,13 @@ __all__ = ["PlaneCartKeywords", "PlaneCartMotion", "cart_motion_plane", "evaluat
 EVERYWHERE = (-math.inf, math.inf)
 
 
-class PlaneCartKeywords(TypedDict, total=False):
-    """Options of `cart_motion_plane`."""
+class PlaneCartKeywords(PlaneCartOptions, total=False):
+    """Keywords of `cart_motion_plane`."""
 
-    turn: float | None
-    """[rad] that joint 1 turns through. Motions that turn the point's azimuth by another number of whole turns are
-    left out: they would not bring the arm to its taught joints. None: the winding is free. None."""
     x_range: tuple[float, float]
     """[m] (lowest, highest) position of the first axis; unlimited. Where both are the same the axis stands."""
     y_range: tuple[float, float]
     """[m] of the second axis."""
-    max_radius: float
-    """[m] > radius + margin: the arm's reach, the farthest that the point may be from axis 1; unlimited."""
-    margin: float
-    """[m] ≥ 0, added to the radius in planning; 0. Between samples the point can be nearer than radius + margin by
-    (r/8) of the square of the angle that a step turns it by; `clearance` tells."""
-    duration: float
-    """[s] > 0 from the first to the last sample; 1. The limits count in it."""
-    max_speed: float | ArrayLike
-    """[m/s] of each axis, one number for both or (2,); unlimited."""
-    max_acceleration: float | ArrayLike
-    """[m/s²] of each axis, second differences over the samples; unlimited. Where the best motion does not keep to
-    the limits, the one of the least energy that does takes its place, along the same way."""
-    at_rest: bool
-    """Start and stop within max_acceleration, where that is finite; False."""
 
 
 def cart_motion_plane(

@@ -16,7 +16,7 @@ __all__ = ["add_clear"]
 def add_clear(
     cost: Cost, chain: Chain, obstacles: Obstacles | DistanceField | None, given: dict[str, Any]
 ) -> tuple[Cost, dict[str, Any]]:
-    """The cost with those of obstacles and of the arm itself, and what a planner checks its motion by.
+    """The cost plus the costs of obstacles and self-collisions, and the scene against which a planner checks a motion.
 
     Takes spheres, margin, obstacle_weight and self_collision out of `given`.
     """

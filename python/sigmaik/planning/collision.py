@@ -1,4 +1,4 @@
-"""How near an arm comes to obstacles, and what that costs."""
+"""The distance of an arm from obstacles, and the cost of small distances."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ def arm_spheres(chain: Chain, source: str | os.PathLike[str] | None = None, radi
     """An arm as spheres fixed to its links.
 
     source
-        The URDF that the chain was read from, as a path or as XML, e.g. ``sk.robots.path(name)``. The boxes, cylinders
-        and spheres of its ``<collision>`` elements, or where a link has none of its ``<visual>`` ones, are covered
-        whole: a cylinder by spheres at most 12 % wider than itself. Links that fixed joints carry beside the arm are
-        part of it. None: capsules from each link's frame to the next.
+        The URDF that the chain was read from, as a path or as XML, e.g. ``sk.robots.path(name)``. Spheres cover the
+        boxes, cylinders and spheres of its ``<collision>`` elements completely, or of a link's ``<visual>`` elements
+        where the link has no ``<collision>``: a cylinder by spheres at most 12 % wider than the cylinder. Links that
+        fixed joints carry beside the arm are part of the arm. None: capsules from each link's frame to the next.
     radius
         [m] > 0 of these capsules, and of those of links that have meshes.
 
@@ -52,7 +52,7 @@ def min_distance(
 ) -> float | Array:
     """The least signed distance [m] from a sphere that moves to the obstacles at q (n,), or (B,) at q (B, n).
 
-    Below 0 there is contact. The base's spheres do not count: where they are, no joint has a say.
+    Below 0 there is contact. The base's spheres do not count, because no joint moves them.
     """
     return _core.min_distance(spheres, _field(obstacles), q, threads)
 

@@ -25,9 +25,9 @@ def trajectory_figure(trajectory: Trajectory, chain: Chain | None = None) -> Fig
     """Positions, speeds and accelerations of all joints over time, between the trajectory's samples too, a line per
     joint.
 
-    With a chain they are parts of its limits, ±1, the middle of a position's range being 0; a joint without the limit
-    is named and not drawn, and where no joint has one the unit is the joint's. Below are σ_min and manipulability
-    √det(JJᵀ) along the way, with what the trajectory knows of singular sets that it crosses.
+    With a chain the values are parts of the chain's limits, ±1, and 0 is the middle of a position's range. A joint
+    without the limit is named and not drawn; where no joint has the limit, values have the joints' own units. Below are
+    σ_min and manipulability √det(JJᵀ) along the way, with the crossings of singular sets that the trajectory knows.
 
     ValueError where the trajectory is empty or the chain has other joints.
     """
@@ -138,7 +138,7 @@ def _joint_style(joint: int) -> dict[str, Any]:
 
 
 def _joint_units(chain: Chain | None) -> tuple[str, ...]:
-    """Of positions; both where nobody knows the joints."""
+    """Units of positions; both units where the types of the joints are not known."""
     if chain is None:
         return ("rad", "m")
     return tuple(dict.fromkeys("m" if kind == "prismatic" else "rad" for kind in chain.joint_types))

@@ -1,4 +1,4 @@
-"""Pictures and files of trajectories: what `Trajectory.plot`, `save` and `load` call."""
+"""Pictures and files of trajectories: the functions that `Trajectory.plot`, `save` and `load` call."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def plot(trajectory: Trajectory, file: str | os.PathLike[str], chain: Chain | No
 
 
 def save(trajectory: Trajectory, file: str | os.PathLike[str]) -> pathlib.Path:
-    """Writes the text of the core for .csv, else an npz file."""
+    """Writes the text that C++ reads for .csv, else an npz file."""
     path = pathlib.Path(file)
     if path.suffix.lower() == ".csv":
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -61,7 +61,7 @@ def save(trajectory: Trajectory, file: str | os.PathLike[str]) -> pathlib.Path:
 
 
 def load(file: str | os.PathLike[str]) -> Trajectory:
-    """Reads either of these."""
+    """Reads a file of either kind."""
     path = pathlib.Path(file)
     if path.suffix.lower() == ".csv":
         return Trajectory._load_text(str(path))

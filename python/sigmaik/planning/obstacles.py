@@ -17,7 +17,7 @@ from sigmaik._types import Array
 __all__ = ["Box", "Cylinder", "Obstacles", "Shape", "Sphere"]
 
 MOST_NODES = 20_000_000
-"""Of a grid: 80 MB."""
+"""Largest number of nodes of a grid: 80 MB."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,20 +107,20 @@ Shape: TypeAlias = Box | Sphere | Cylinder
 
 
 class Obstacles:
-    """What a motion has to keep clear of, in the axes of the arm's base, as signed distances on a grid.
+    """Obstacles of a motion, in the axes of the arm's base, as signed distances on a grid.
 
         table = sk.planning.Box(size=(0.8, 1.2, 0.04), pose=(0.6, 0.0, 0.4))
         ball = sk.planning.Sphere(radius=0.1, center=(0.3, 0.4, 0.7))
         obstacles = sk.planning.Obstacles([table, ball])
         obstacles.distance(points), obstacles.gradient(points)     # (M,), (M, 3) at points (M, 3)
 
-    A node's distance is exact outside all shapes; where shapes overlap, a depth is that in the deepest of them. Between
-    the nodes it is interpolated, wrong by at most √3/2 `resolution`; outside the grid it is a bound from below of the
-    distance to what lies within (see `DistanceField`).
+    A node's distance is exact outside all shapes; where shapes overlap, the depth is the depth in the deepest shape.
+    Between the nodes the distance is interpolated, with an error of at most √3/2 `resolution`; outside the grid the
+    value is a lower bound of the distance to everything inside the grid (see `DistanceField`).
     """
 
     field: DistanceField
-    """What costs are made from."""
+    """The distances, for the costs of collisions."""
     shapes: tuple[Shape, ...]
     """Empty where the field comes from an occupancy grid."""
 
@@ -137,11 +137,11 @@ class Obstacles:
         ----------
         bounds
             (2, 3) [m]: lowest and highest corner of the grid. By default the box around all shapes and `margin` [m].
-            Give bounds where shapes are larger than what the arm can reach, e.g. a floor; what they cut off counts as
-            free beyond them.
+            Give bounds where shapes are larger than the space that the arm can reach, e.g. a floor; the space beyond
+            the bounds counts as free, even inside a shape.
         margin
-            [m] ≥ 0. Beyond it distances are bounds, so it should be more than a cost's clearance and the arm's thickest
-            sphere together.
+            [m] ≥ 0. Beyond the margin distances are lower bounds, so the margin should be more than a cost's clearance
+            and the radius of the arm's thickest sphere together.
         resolution
             [m] > 0 from node to node.
 
@@ -177,7 +177,7 @@ class Obstacles:
         distances = np.empty([len(axis) for axis in axes])
         face = np.empty([len(axes[1]), len(axes[2]), 3])
         face[..., 1], face[..., 2] = axes[1][:, None], axes[2]
-        for i, x in enumerate(axes[0]):  # a face at a time: no more memory than the grid's
+        for i, x in enumerate(axes[0]):  # face by face, which needs little more memory than the grid
             face[..., 0] = x
             distances[i] = np.min([shape.distance(face) for shape in self.shapes], axis=0)
         self.field = DistanceField(distances, low, resolution)
@@ -186,9 +186,10 @@ class Obstacles:
     def from_occupancy(cls, occupied: ArrayLike, origin: ArrayLike, cell: float) -> Obstacles:
         """From an occupancy grid, by the Euclidean distance transform of SciPy (extra ``obstacles``).
 
-        occupied (X, Y, Z), true where there is something; `origin` (3,) [m] the centre of cell (0, 0, 0) in the base's
-        axes; `cell` [m] a cell's side. A surface lies half a cell from the centres on either side of it, exact where it
-        is parallel to an axis; elsewhere a distance is up to 0.37 cells too large outside, and too deep inside.
+        `occupied` (X, Y, Z) is true where a cell is occupied; `origin` (3,) [m] is the centre of cell (0, 0, 0) in the
+        base's axes; `cell` [m] is a cell's side. A surface lies half a cell from the cells' centres on either side.
+        Distances are exact where the surface is parallel to an axis; elsewhere a distance is up to 0.37 cells too large
+        outside, and too deep inside.
 
         Error where no cell is occupied, or none is free; MissingPackage where SciPy is not installed.
         """
@@ -278,7 +279,7 @@ def _local(pose: ArrayLike, points: ArrayLike) -> Array:
 
 
 def _outside_and_in(beside: Array) -> Array:
-    """From distances (…, k) to k pairs of faces at right angles, negative between the two of a pair."""
+    """Signed distances (…) from distances (…, k) to k pairs of faces at right angles, negative between a pair."""
     outside = np.linalg.norm(np.maximum(beside, 0.0), axis=-1)
     signed: Array = outside + np.minimum(beside.max(axis=-1), 0.0)
     return signed

@@ -65,7 +65,8 @@ def gradient(
         cost written in Python raises comes through as it is.
     """
     given = checked("gradient", GradientKeywords, keywords, options)
-    return _planner(chain, cost, obstacles, given).plan_gradient(start, goal, **given)
+    costs = _costs(chain, cost, obstacles, given)
+    return _core.plan_gradient(chain, start, goal, **costs, **given)
 
 
 def stochastic(
@@ -96,23 +97,24 @@ def stochastic(
     Returns and raises as `gradient`; `status` is "feasible" unless refined: no minimum is claimed.
     """
     given = checked("stochastic", StochasticKeywords, keywords, options)
-    return _planner(chain, cost, obstacles, given).plan_stochastic(start, goal, seed=seed, **given)
+    costs = _costs(chain, cost, obstacles, given)
+    return _core.plan_stochastic(chain, start, goal, seed=seed, **costs, **given)
 
 
-def _planner(
+def _costs(
     chain: Chain,
     cost: Cost | JointCost | BatchCost | None,
     obstacles: Obstacles | DistanceField | None,
     given: dict[str, Any],
-) -> _core.SupportPlanner:
-    """Takes all but the options out of `given`."""
+) -> dict[str, Any]:
+    """What the planner is given beside its options, which are left in `given`."""
     own = {name: given.pop(name) for name in ("index", "weight", "k", "costs") if name in given}
     total = _indexed(**own) if cost is None else Cost.of(cost)
     total, scene = add_clear(total, chain, obstacles, given)
     if not total.parts:
         raise Error("there is no cost: index is None, and neither obstacles nor other costs are given")
     smooth, others = total.bind(chain)
-    return _core.SupportPlanner(chain, smooth, given.pop("states", 21), list(others), **scene)
+    return {"cost": smooth, "python_costs": list(others), **scene}
 
 
 def _indexed(

@@ -13,7 +13,7 @@ class PlanStatus(str, Enum):
     OPTIMAL = "optimal"
     """A local minimum, to the tolerance."""
     FEASIBLE = "feasible"
-    """Within all constraints, but with something left to gain."""
+    """Within all constraints, but not at a minimum."""
     FAILED = "failed"
     """No motion within the constraints was found, and none is returned."""
 

@@ -1,10 +1,10 @@
-"""What a motion pays for where it is: costs that add up, before it is known of which arm.
+"""Costs of configurations, which add up before the arm is known.
 
     cost = costs.Potential() + 2.0 * costs.Collision(obstacles) + MyCost()
     sk.planning.time_optimal(chain, start, goal, cost=cost)
 
-This is the one list of them. A new cost is a file of its own here with a `Term`, and its name in this list; a cost of a
-user's own is any object with ``value(q: (B, n)) -> (B,)`` and needs neither.
+This module is the one list of all costs. A new cost needs a file of its own in this folder, with a `Term`, and its name
+in this list. A cost of a user's own is any object with ``value(q: (B, n)) -> (B,)``, and needs neither.
 """
 
 from .clear import Collision, JointLimits, SelfCollision

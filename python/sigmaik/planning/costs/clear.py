@@ -49,7 +49,8 @@ class SelfCollision(Term):
 
 @dataclass(frozen=True)
 class JointLimits(Term):
-    """weight · Σ_j ½ x_j², x_j the way by which joint j is nearer to a limit than `margin`, or beyond it."""
+    """weight · Σ_j ½ x_j², x_j = max(0, margin − d_j), d_j the distance of joint j to its nearer limit, negative beyond
+    the limit."""
 
     margin: float = 0.1
     """[rad or m] ≥ 0"""

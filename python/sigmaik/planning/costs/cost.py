@@ -1,4 +1,4 @@
-"""Costs put together before it is known of which arm."""
+"""Sums of costs, put together before the arm is known."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ __all__ = ["Cost", "Term", "cost_of"]
 
 
 class Bindable(Protocol):
-    """What a cost is made of."""
+    """A part of a cost."""
 
     def bind(self, chain: Chain, factor: float) -> JointCost | BatchCost:
         """`factor` times this cost, of one arm's joints."""
@@ -30,8 +30,8 @@ class Cost:
 
         cost = costs.Potential() + 2.0 * costs.Collision(obstacles) + MyCost()
 
-    Costs add up, and take factors that are not below 0. What is added may be a cost of this package, a `JointCost`, or
-    any object with ``value(q: (B, n)) -> (B,)`` (`BatchCost`); ``Cost.of(MyCost())`` makes one alone a Cost.
+    Costs add up, and take factors that are not below 0. A summand may be a cost of this package, a `JointCost`, or any
+    object with ``value(q: (B, n)) -> (B,)`` (`BatchCost`); ``Cost.of(MyCost())`` makes a Cost of one summand alone.
     """
 
     __slots__ = ("parts",)
@@ -41,11 +41,11 @@ class Cost:
 
     @staticmethod
     def of(cost: Any) -> Cost:
-        """A Cost as it is; anything else that can be added to one, as one. Error for what cannot."""
+        """Returns a Cost unchanged, and makes a Cost of any other summand. Error where the object is no cost."""
         return cost_of(cost)
 
     def bind(self, chain: Chain) -> tuple[JointCost | None, tuple[BatchCost, ...]]:
-        """For one arm: the sum of the parts that have a Hessian, None where there is none, and the other parts."""
+        """For one arm: the sum of the parts that have a Hessian (None where no part has one), and the other parts."""
         bound = [part.bind(chain, factor) for factor, part in self.parts]
         smooth = [cost for cost in bound if isinstance(cost, JointCost)]
         others = tuple(cost for cost in bound if not isinstance(cost, JointCost))

@@ -15,7 +15,7 @@ __all__ = ["ETA1", "ETA2", "LogManipulability", "Manipulability", "Potential"]
 ETA1 = math.log(2400.0)
 """log of a potential's height (Beck et al. 2022, table 2)."""
 ETA2 = 400.0
-"""[1/rad²] of a potential, its inverse squared width (Beck et al. 2022, table 2)."""
+"""[1/rad²] Inverse squared width of a potential (Beck et al. 2022, table 2)."""
 
 
 @dataclass(frozen=True)
