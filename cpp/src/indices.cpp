@@ -2,15 +2,13 @@
 
 #include <cmath>
 
-#include <Eigen/Eigenvalues>
-
 #include <sigmaik/spectrum.hpp>
 
-#include "aligned.hpp"
 #include "message.hpp"
 #include "numbers.hpp"
 #include "quasi_random.hpp"
 #include "ranges.hpp"
+#include "symmetric_eigen.hpp"
 
 namespace sigmaik {
 namespace {
@@ -88,17 +86,16 @@ IndexFunction::IndexFunction(Index index, const IndexOptions& options)
   detail::require(
       sigma.allFinite() && (sigma - sigma.transpose()).cwiseAbs().maxCoeff() <= 1e-9 * sigma.cwiseAbs().maxCoeff(),
       "Σ must be finite and symmetric");
-  const Eigen::SelfAdjointEigenSolver<detail::Aligned<TaskMatrix>> eigen(sigma);
-  detail::require(eigen.eigenvalues()[0] > 0.0, "Σ must be positive definite; its smallest eigenvalue is ",
-                  eigen.eigenvalues()[0]);
-  whiten_ = eigen.operatorInverseSqrt();
+  const auto [values, vectors] = detail::symmetric_eigen(sigma);
+  detail::require(values[0] > 0.0, "Σ must be positive definite; its smallest eigenvalue is ", values[0]);
+  whiten_ = vectors.lazyProduct(values.cwiseSqrt().cwiseInverse().asDiagonal() * vectors.transpose());
   inverse_k_ = 1.0;
 }
 
 double IndexFunction::value(const TaskJacobianRef& jacobian) const noexcept {
   TaskJacobian weighted = jacobian;
   if (weighted.rows() > 3) weighted.bottomRows(weighted.rows() - 3) *= angular_;
-  if (whiten_.size() != 0) weighted = (whiten_ * weighted).eval();
+  if (whiten_.size() != 0) weighted = whiten_.lazyProduct(weighted).eval();
   return of_jacobian(index_, weighted, 1.0 / inverse_k_);
 }
 

@@ -77,6 +77,59 @@ void complete(Basis basis, int i, int dimension, unsigned given) noexcept {
   basis.col(i) = best / length;
 }
 
+// The steps of decompose_padded(). They are inlined, as they run in every control cycle.
+
+// One Newton step towards the nearest orthogonal matrix, which squares the defect that rounding has left.
+SIGMAIK_INLINE void refresh(double* rotated, int stride) noexcept {
+  using Square = Eigen::Matrix<double, kMaxTask, kMaxTask>;
+  Eigen::Map<Square, 0, Eigen::OuterStride<>> r(rotated, Eigen::OuterStride<>(stride));
+  Square gram = r.transpose() * r;
+  r = (r * (1.5 * Square::Identity() - 0.5 * gram)).eval();
+}
+
+// Returns the number of sweeps. `factor` is what scales the Jacobian so that its squares neither overflow nor vanish.
+template <int length>
+SIGMAIK_INLINE int run_scaled(JacobiWork<length>& work, int k, const TaskJacobianRef& jacobian, std::ptrdiff_t inner,
+                              std::ptrdiff_t outer, int count, double& factor) noexcept {
+  factor = 1.0;
+  const int sweeps = run<length>(work, k, jacobian.data(), inner, outer, count, factor);
+  if (sweeps != 0) return sweeps;
+  const double peak = jacobian.cwiseAbs().maxCoeff();
+  if (!(peak > 0.0)) return 0;
+  factor = std::ldexp(1.0, std::clamp(-std::ilogb(peak), -1000, 1000));
+  return run<length>(work, k, jacobian.data(), inner, outer, count, factor);
+}
+
+// Below this a column is mostly rounding: neither its direction nor its place among its like means anything.
+SIGMAIK_INLINE double noise_square(const double* square, int k) noexcept {
+  double peak = 0.0;
+  for (int i = 0; i < k; ++i) peak = std::max(peak, square[i]);
+  return peak * (detail::kNoise * detail::kNoise);
+}
+
+// Insertion sort, from large to small; what is equal keeps the last cycle's order.
+SIGMAIK_INLINE void sort_squares(const double* square, int k, double noise, std::array<int, kMaxTask>& order) noexcept {
+  for (int i = 0; i < k; ++i) {
+    int at = i;
+    for (const double more = square[i] * (1.0 - detail::kNoise);
+         at > 0 && more > noise && square[order[static_cast<std::size_t>(at - 1)]] < more; --at) {
+      order[static_cast<std::size_t>(at)] = order[static_cast<std::size_t>(at - 1)];
+    }
+    order[static_cast<std::size_t>(at)] = i;
+  }
+}
+
+// Where there is noise, both vectors go on from the last cycle's: the rotations have stirred them as they liked.
+template <typename U, typename V>
+SIGMAIK_INLINE void complete_both(const U& u, int m, const V& v, int n, unsigned given) noexcept {
+  for (int i = 0; i < m; ++i) {
+    if (given >> i & 1u) continue;
+    complete(u, i, m, given);
+    if (i < std::min(m, n)) complete(v, i, n, given);
+    given |= 1u << i;
+  }
+}
+
 }  // namespace
 
 void Spectrum::decompose(const TaskJacobianRef& jacobian) noexcept {
@@ -141,39 +194,16 @@ void Spectrum::decompose_padded(const TaskJacobianRef& jacobian) noexcept {
   if (cycle_ == 0) {
     for (int i = 0; i < k; ++i) rotated[i * rotated_stride + i] = 1.0;
   } else if (cycle_ % kRefreshPeriod == 0) {
-    // One Newton step towards the nearest orthogonal matrix, which squares the defect that rounding has left.
-    using Square = Eigen::Matrix<double, kMaxTask, kMaxTask>;
-    Eigen::Map<Square, 0, Eigen::OuterStride<>> r(rotated, Eigen::OuterStride<>(rotated_stride));
-    Square gram = r.transpose() * r;
-    r = (r * (1.5 * Square::Identity() - 0.5 * gram)).eval();
+    refresh(rotated, rotated_stride);
   }
   ++cycle_;
   for (int i = 0; i < k; ++i) std::copy_n(rotated + i * rotated_stride, kPaddedTask, work.r[i]);
 
-  double factor = 1.0;
-  sweeps_ = run<kPadded>(work, k, jacobian.data(), inner, outer, length, factor);
-  if (sweeps_ == 0) {
-    const double peak = jacobian.cwiseAbs().maxCoeff();
-    if (peak > 0.0) {
-      factor = std::ldexp(1.0, std::clamp(-std::ilogb(peak), -1000, 1000));
-      sweeps_ = run<kPadded>(work, k, jacobian.data(), inner, outer, length, factor);
-    }
-  }
-
-  // Below this a column is mostly rounding: neither its direction nor its place among its like means anything.
-  double peak = 0.0;
-  for (int i = 0; i < k; ++i) peak = std::max(peak, work.square[i]);
-  const double noise = peak * (detail::kNoise * detail::kNoise);
-
+  double factor;
+  sweeps_ = run_scaled(work, k, jacobian, inner, outer, length, factor);
+  const double noise = noise_square(work.square, k);
   std::array<int, kMaxTask> order{};
-  for (int i = 0; i < k; ++i) {  // insertion sort, from large to small; what is equal keeps the last cycle's order
-    int at = i;
-    for (const double more = work.square[i] * (1.0 - detail::kNoise);
-         at > 0 && more > noise && work.square[order[static_cast<std::size_t>(at - 1)]] < more; --at) {
-      order[static_cast<std::size_t>(at)] = order[static_cast<std::size_t>(at - 1)];
-    }
-    order[static_cast<std::size_t>(at)] = i;
-  }
+  sort_squares(work.square, k, noise, order);
 
   unsigned given = 0;
   for (int i = 0; i < k; ++i) {
@@ -188,15 +218,9 @@ void Spectrum::decompose_padded(const TaskJacobianRef& jacobian) noexcept {
     for (int j = 0; j < count; ++j) divided[i * divided_stride + j] = inverse * work.w[from][j];
   }
   std::sort(sigma_.begin(), sigma_.begin() + k, std::greater<>{});  // what is equal but for rounding, too
-  // Where there is noise, both vectors go on from the last cycle's: the rotations have stirred them as they liked.
   const Eigen::Map<Eigen::Matrix<double, kPaddedTask, kMaxTask>> u(u_.data());
   const Eigen::Map<Eigen::Matrix<double, kMaxJoints, kMaxTask>> v(v_.data());
-  for (int i = 0; i < m_; ++i) {
-    if (given >> i & 1u) continue;
-    complete(u, i, m_, given);
-    if (i < k) complete(v, i, n_, given);
-    given |= 1u << i;
-  }
+  complete_both(u, m_, v, n_, given);
 }
 
 }  // namespace sigmaik

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "oracles.hpp"
+#include <Eigen/QR>
 
 namespace test {
 
@@ -16,7 +16,9 @@ VectorXd Random::vector(int n) { return matrix(n, 1); }
 
 VectorXd Random::unit(int n) { return vector(n).normalized(); }
 
-MatrixXd Random::orthonormal(int m, int k) { return orthonormal_basis(matrix(m, k)); }
+MatrixXd Random::orthonormal(int m, int k) {
+  return Eigen::HouseholderQR<MatrixXd>(matrix(m, k)).householderQ() * MatrixXd::Identity(m, k);
+}
 
 MatrixXd Random::with_singular_values(int m, int n, const VectorXd& sigma) {
   const int k = static_cast<int>(sigma.size());

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <array>
 
-#include <Eigen/SVD>
+#include <sigmaik/spectrum.hpp>
 
 namespace sigmaik::planning::detail {
 
@@ -34,7 +34,7 @@ JointVector other_side(const SingularSets& sets, const Crossing& crossing, const
   };
 
   const JointVector at = Eigen::Map<const Eigen::VectorXd>(crossing.q.data(), n);
-  Eigen::MatrixXd slope(codimension, n);
+  TaskJacobian slope(codimension, n);
   for (int j = 0; j < n; ++j) {
     JointVector up = at, down = at;
     up[j] += kStep;
@@ -48,9 +48,14 @@ JointVector other_side(const SingularSets& sets, const Crossing& crossing, const
     aim = -residuals(at);
     if (!(aim.norm() > 1e-9)) aim = Residuals::Unit(codimension, 0);
   }
-  Eigen::JacobiSVD<Eigen::MatrixXd> svd(slope, Eigen::ComputeThinU | Eigen::ComputeThinV);
-  svd.setThreshold(1e-15);
-  JointVector direction = svd.solve(Eigen::VectorXd(aim));
+  // The shortest direction along which the residuals change by `aim`.
+  Spectrum spectrum;
+  spectrum.decompose(slope);
+  JointVector direction = JointVector::Zero(n);
+  for (int i = 0; i < codimension; ++i) {
+    const double sigma = spectrum.sigma(i);
+    if (sigma > 1e-15 * spectrum.sigma(0)) direction += spectrum.u(i).dot(aim) / sigma * spectrum.v(i);
+  }
   const double length = direction.norm();
   if (length > 0.0) direction /= length;
   return direction;

@@ -68,6 +68,16 @@ void check(const std::optional<double>& duration) {
           " must be finite and greater than 0");
 }
 
+void check(const StochasticOptions& options) {
+  require(options.samples >= 2, "samples = ", options.samples, " must be at least 2");
+  require(options.max_iterations >= 1, "max_iterations = ", options.max_iterations, " must be at least 1");
+  require_number("deviation", options.deviation, 0.0, true);
+  require(options.decay > 0.0 && options.decay <= 1.0, "decay = ", options.decay, " must be in (0, 1]");
+  require_number("temperature", options.temperature, 0.0, true);
+  require_number("prior_weight", options.prior_weight, 0.0, false);
+  require_number("tolerance", options.tolerance, 0.0, false);
+}
+
 // [s] since it was made.
 class Stopwatch {
  public:
@@ -80,6 +90,8 @@ class Stopwatch {
 }  // namespace
 
 struct SupportPlanner::Work {
+  class StochasticSearch;
+
   Chain chain;
   BatchCostPtr cost;
   std::optional<CollisionCheck> obstacles;
@@ -210,6 +222,94 @@ struct SupportPlanner::Work {
   }
 };
 
+// The stochastic search from the line, once Work has begun.
+class SupportPlanner::Work::StochasticSearch {
+ public:
+  StochasticSearch(Work& work, const StochasticOptions& options)
+      : w_(work),
+        options_(options),
+        normal_(options.seed),
+        q_(w_.line),
+        best_(q_),
+        sample_(w_.m, w_.n),
+        move_(w_.m, w_.n),
+        least_(objective(q_, best_cost_)),
+        deviation_(options.deviation),
+        moves_(static_cast<std::size_t>(options.samples), Matrix(w_.m, w_.n)),
+        values_(static_cast<std::size_t>(options.samples)),
+        history_{least_} {}
+
+  // Moves the mean once. True where the best states have settled.
+  bool iterate() {
+    draw();
+    move();
+    deviation_ *= options_.decay;
+    history_.push_back(least_);
+    constexpr std::size_t kWindow = 8;
+    return history_.size() > kWindow &&
+           history_[history_.size() - 1 - kWindow] - least_ <= options_.tolerance * std::abs(least_);
+  }
+
+  const Matrix& best() const { return best_; }
+  double best_cost() const { return best_cost_; }  // of its states, without the prior
+
+ private:
+  double objective(const Matrix& q, double& states_cost) {
+    states_cost = w_.value(q);
+    return states_cost + (options_.prior_weight > 0.0 ? options_.prior_weight * w_.whiten(q).squaredNorm() : 0.0);
+  }
+
+  // The objective at q, which is remembered where it is the least yet.
+  double visit(const Matrix& q) {
+    double states_cost;
+    const double value = objective(q, states_cost);
+    if (value < least_) {
+      least_ = value;
+      best_ = q;
+      best_cost_ = states_cost;
+    }
+    return value;
+  }
+
+  void draw() {
+    low_ = std::numeric_limits<double>::infinity();
+    high_ = -low_;
+    for (std::size_t k = 0; k < values_.size(); ++k) {
+      w_.draw(normal_, q_, deviation_, sample_);
+      values_[k] = visit(sample_);
+      moves_[k] = sample_ - q_;
+      low_ = std::min(low_, values_[k]);
+      high_ = std::max(high_, values_[k]);
+    }
+  }
+
+  // Moves the mean to where the samples were good.
+  void move() {
+    move_.setZero();
+    double total = 0.0;
+    for (std::size_t k = 0; k < values_.size(); ++k) {
+      const double weight = high_ > low_ ? std::exp(-(values_[k] - low_) / (options_.temperature * (high_ - low_)))
+                                         : 1.0;
+      total += weight;
+      move_ += weight * moves_[k];
+    }
+    // (16): K̄ spreads what a state asks for; its columns' scale makes a common wish of all states go through whole.
+    sample_.noalias() = w_.smoothing * move_;
+    q_ += sample_ / total;
+    w_.clip(q_);
+    visit(q_);
+  }
+
+  Work& w_;
+  const StochasticOptions& options_;
+  Normal normal_;
+  Matrix q_, best_, sample_, move_;
+  double best_cost_ = 0.0, least_, deviation_;
+  double low_ = 0.0, high_ = 0.0;  // of the samples' values
+  std::vector<Matrix> moves_;
+  std::vector<double> values_, history_;
+};
+
 SupportPlanner::SupportPlanner(Chain chain, BatchCostPtr cost, int states, std::optional<CollisionCheck> obstacles)
     : work_(std::make_unique<Work>(std::move(chain), std::move(cost), states, std::move(obstacles))) {}
 SupportPlanner::~SupportPlanner() = default;
@@ -265,69 +365,13 @@ SupportStates SupportPlanner::gradient(const JointVector& start, const JointVect
 SupportStates SupportPlanner::stochastic(const JointVector& start, const JointVector& goal,
                                          const StochasticOptions& options) {
   Work& w = *work_;
-  require(options.samples >= 2, "samples = ", options.samples, " must be at least 2");
-  require(options.max_iterations >= 1, "max_iterations = ", options.max_iterations, " must be at least 1");
-  require_number("deviation", options.deviation, 0.0, true);
-  require(options.decay > 0.0 && options.decay <= 1.0, "decay = ", options.decay, " must be in (0, 1]");
-  require_number("temperature", options.temperature, 0.0, true);
-  require_number("prior_weight", options.prior_weight, 0.0, false);
-  require_number("tolerance", options.tolerance, 0.0, false);
+  check(options);
   w.begin(start, goal);
-
-  Normal normal(options.seed);
-  const auto objective = [&](const Matrix& q, double& states_cost) {
-    states_cost = w.value(q);
-    return states_cost + (options.prior_weight > 0.0 ? options.prior_weight * w.whiten(q).squaredNorm() : 0.0);
-  };
-
-  Matrix q = w.line, best = q, sample(w.m, w.n), move(w.m, w.n);
-  double best_cost = 0.0, least = objective(q, best_cost), deviation = options.deviation;
-  std::vector<Matrix> moves(static_cast<std::size_t>(options.samples), Matrix(w.m, w.n));
-  std::vector<double> values(static_cast<std::size_t>(options.samples));
-  std::vector<double> history{least};
+  Work::StochasticSearch search(w, options);
   bool converged = false;
   int iteration = 0;
-  for (; iteration < options.max_iterations && !converged; ++iteration) {
-    double low = std::numeric_limits<double>::infinity(), high = -low;
-    for (std::size_t k = 0; k < values.size(); ++k) {
-      w.draw(normal, q, deviation, sample);
-      double states_cost;
-      values[k] = objective(sample, states_cost);
-      if (values[k] < least) {
-        least = values[k];
-        best = sample;
-        best_cost = states_cost;
-      }
-      moves[k] = sample - q;
-      low = std::min(low, values[k]);
-      high = std::max(high, values[k]);
-    }
-    move.setZero();
-    double total = 0.0;
-    for (std::size_t k = 0; k < values.size(); ++k) {
-      const double weight = high > low ? std::exp(-(values[k] - low) / (options.temperature * (high - low))) : 1.0;
-      total += weight;
-      move += weight * moves[k];
-    }
-    // (16): K̄ spreads what a state asks for; its columns' scale makes a common wish of all states go through whole.
-    sample.noalias() = w.smoothing * move;
-    q += sample / total;
-    w.clip(q);
-    double states_cost;
-    const double value = objective(q, states_cost);
-    if (value < least) {
-      least = value;
-      best = q;
-      best_cost = states_cost;
-    }
-    deviation *= options.decay;
-    history.push_back(least);
-    const std::size_t window = 8;
-    if (history.size() > window) {
-      converged = history[history.size() - 1 - window] - least <= options.tolerance * std::abs(least);
-    }
-  }
-  return w.result(start, goal, best, best_cost, iteration, converged);
+  for (; iteration < options.max_iterations && !converged; ++iteration) converged = search.iterate();
+  return w.result(start, goal, search.best(), search.best_cost(), iteration, converged);
 }
 
 SupportStates SupportPlanner::draw(const JointVector& start, const JointVector& goal, double deviation,

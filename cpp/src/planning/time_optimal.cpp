@@ -4,12 +4,19 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <numeric>
 #include <utility>
+#include <vector>
 
-#include "../aligned.hpp"
 #include "../message.hpp"
+#include "../symmetric_eigen.hpp"
 #include "interior_point.hpp"
+#include "interior_point_guess.hpp"
+#include "interior_point_limits.hpp"
+#include "interior_point_loop.hpp"
+#include "interior_point_merit.hpp"
+#include "interior_point_step.hpp"
 #include "other_side.hpp"
 #include "samples.hpp"
 
@@ -161,7 +168,7 @@ JointVector TimeOptimal::way_out(const TimeOptimalResult& found) const {
   JointMatrix hessian(n, n);
   cost_->model(node(at), gradient, hessian);
   if (gradient.norm() > 1e-6 * most) return -gradient.normalized();
-  return Eigen::SelfAdjointEigenSolver<sigmaik::detail::Aligned<JointMatrix>>(hessian).eigenvectors().col(0);
+  return sigmaik::detail::symmetric_eigen(hessian).vectors.col(0);
 }
 
 // A standing motion, for start == goal. The interior-point method has no strictly feasible point where the start lies
