@@ -16,6 +16,7 @@ int main(int argc, char** argv) try {
     sigmaik::ServoStep step;
     for (int cycle = 0; cycle < 15000; ++cycle) {  // real time from here: noexcept, no heap, no locks
       step = servo.update(target);
+      // A controller sends this step, too: the step is a cycle of the stop.
       if (step.status == sigmaik::Status::BadInput) return 1;
       // step.q and step.qdot go to the arm
     }

@@ -185,7 +185,7 @@ Chain Chain::with_limits(const JointLimits& limits) const {
     s.acceleration = limits.acceleration[i];
     s.jerk = limits.jerk[i];
     s.effort = limits.effort[i];
-    s.notes.clear();  // they told of the limits that these replace
+    s.notes.clear();  // the notes are about the limits that the new ones replace
     ++i;
   }
   return Chain(model_->base, std::move(segments));

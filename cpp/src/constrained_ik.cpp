@@ -197,7 +197,8 @@ struct ConstrainedIk::Linearisation {
   Jacobian slope;
   Twist offset, turned;
 
-  // At the tip `state` of joint positions from which it is `back` to where the step starts.
+  // `state` belongs to the joint positions of this linearisation; `back` is the step from there to the start of the
+  // cycle.
   Linearisation(const ChainState& state, const Pose& target, const Twist& motion, const JointVector& back) noexcept
       : slope(state.jacobian), offset(-pose_error(state.tip, target)), turned(motion) {
     const Eigen::Matrix3d turn = inverse_left_jacobian(offset.tail<3>());
@@ -274,7 +275,7 @@ void ConstrainedIk::optimise(const Pose& target, const Twist& motion, Constraine
   report(solution, error_lost, step);
 }
 
-// What the last solution says of the step.
+// Fills in the fields that the last solution decides.
 void ConstrainedIk::report(const LeastSquaresSolution& solution, bool error_lost,
                            ConstrainedIkStep& step) const noexcept {
   if (solution.status == LeastSquaresStatus::BadInput) {

@@ -1,6 +1,6 @@
 #pragma once
-// Whether all entries are finite. x·0 is 0 for finite x only, and sums of it take a fraction of the tests that Eigen's
-// allFinite() makes.
+// Whether all entries are finite. x·0 is 0 for finite x only, and a sum of these products needs a fraction of the tests
+// that Eigen's allFinite() makes.
 
 #include <Eigen/Core>
 

@@ -1,7 +1,7 @@
 #pragma once
-// The kernel under the singular value decomposition: one-sided Jacobi on a few short columns, written in the
-// compiler's vector types so that it needs to guess nothing. `lanes` is the width of a vector: two in every x86-64,
-// four where the processor has AVX2, which is asked at run time.
+// The kernel under the singular value decomposition: one-sided Jacobi on a few short columns, written in the compiler's
+// vector types so that no vectoriser has to guess. `lanes` is the width of a vector: two on every x86-64, four where
+// the processor has AVX2, which is checked at run time.
 
 #include <cstddef>
 #include <limits>
@@ -51,10 +51,10 @@ template <> struct Rounds<6> { static constexpr int count = 5, width = 3; static
     {{0,1},{2,5},{3,4}}, {{0,5},{1,4},{2,3}}, {{0,4},{3,5},{1,2}}, {{0,3},{2,4},{1,5}}, {{0,2},{1,3},{4,5}}}; };
 // clang-format on
 
-// Columns shorter than this part of the longest are mostly rounding: nothing in them is to be made orthogonal.
+// Columns shorter than this part of the longest are mostly rounding, and are not made orthogonal.
 constexpr double kNoise = 16.0 * std::numeric_limits<double>::epsilon();
-// Columns with a cosine up to this are orthogonal but for rounding. Turning them further would stir, every cycle, the
-// directions of singular values that are equal.
+// Columns with a cosine up to this value are orthogonal but for rounding. Further rotations would change, in every
+// cycle, the directions of singular values that are equal.
 constexpr double kOrthogonal = 16.0 * std::numeric_limits<double>::epsilon();
 
 // The inner product c of columns of squares a and b, or 0 where they are to be left as they are.
@@ -74,9 +74,9 @@ SIGMAIK_INLINE double measure(JacobiWork<length>& work) {
   return peak;
 }
 
-// A last sweep for columns that are all but orthogonal: every angle at once, to first order, which is to rounding where
-// all are below 1e-8. Without the chain of angles it costs a fraction of a full one. False, with nothing done, where
-// an angle is larger.
+// A last sweep for columns that are almost orthogonal: all angles at once, to first order, which is exact to rounding
+// if all angles are below 1e-8. Without the chain of angles this sweep costs a fraction of a full one. Returns false,
+// with nothing done, if an angle is larger.
 template <int k, int lanes, int length>
 SIGMAIK_INLINE bool polish(JacobiWork<length>& work, double noise) {
   using Order = Rounds<k>;
@@ -106,8 +106,8 @@ SIGMAIK_INLINE bool polish(JacobiWork<length>& work, double noise) {
   return true;
 }
 
-// Rotates pairs of columns of w, and of r with them, until all are orthogonal; leaves their squares. Returns the
-// sweeps, or 0 with nothing done where squares or their squares would overflow or vanish.
+// Rotates pairs of columns of w, and of r with them, until all are orthogonal; leaves their squares. Returns the number
+// of sweeps, or 0 with nothing done where squares or their squares would overflow or vanish.
 template <int k, int lanes, int length>
 SIGMAIK_INLINE int orthogonalise(JacobiWork<length>& work, int max_sweeps) {
   using Order = Rounds<k>;
@@ -133,7 +133,7 @@ SIGMAIK_INLINE int orthogonalise(JacobiWork<length>& work, int max_sweeps) {
         t[j] = c[j] / (d[j] + __builtin_copysign(1e-300, d[j]));
         ratio = larger(ratio, __builtin_fabs(t[j]));
       }
-      if (ratio < 2e-3) {  // small angles, the rule of a warm start: series, exact to rounding, for the square roots
+      if (ratio < 2e-3) {  // small angles, usual at a warm start: series, exact to rounding, for the square roots
 #pragma GCC unroll 3
         for (int j = 0; j < Order::width; ++j) {
           t[j] -= t[j] * t[j] * t[j];
@@ -172,8 +172,8 @@ SIGMAIK_INLINE int orthogonalise(JacobiWork<length>& work, int max_sweeps) {
         worst_tangent = larger(worst_tangent, __builtin_fabs(t[j]));
       }
     }
-    // What a sweep leaves behind is of second order: an inner product that was zeroed early meets the rotations that
-    // come later, and becomes at most (cosine of the one) × (cosine, or tangent, of the other).
+    // The inner products after a sweep are of second order: later rotations change an inner product that was zeroed
+    // early to at most (cosine of the one) × (cosine, or tangent, of the other).
     worst_cosine = __builtin_sqrt(worst_cosine);
     left = worst_cosine * larger(worst_cosine, worst_tangent);
     if (left <= kEpsilon) break;
@@ -182,7 +182,7 @@ SIGMAIK_INLINE int orthogonalise(JacobiWork<length>& work, int max_sweeps) {
   return sweep;
 }
 
-// `lanes` entries of a strided vector of `count` from `from` on, zero beyond.
+// `lanes` entries from index `from` on of a strided vector with `count` entries, zeros beyond the end.
 template <int lanes>
 SIGMAIK_INLINE Vector<lanes> gather(const double* x, std::ptrdiff_t stride, int from, int count, double factor) {
   Vector<lanes> out = splat<lanes>(0.0);

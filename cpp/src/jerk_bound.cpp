@@ -12,8 +12,8 @@ constexpr int kMostEvaluations = 16;
 
 double square(double x) noexcept { return x * x; }
 
-// Nearly the largest x in [a, b] with f(x) ≤ 0, for f that grows, f(a) = fa ≤ 0 < fb = f(b); never more. Regula falsi
-// (Illinois), kept away from the ends.
+// Almost the largest x in [a, b] with f(x) ≤ 0, and never a larger one, for an increasing f with f(a) = fa ≤ 0 and fb =
+// f(b). Regula falsi (Illinois), kept away from the ends.
 template <typename Function>
 double largest_below_zero(double a, double fa, double b, double fb, Function f) noexcept {
   const double tolerance = kLimitTolerance * (b - a);
@@ -38,7 +38,8 @@ double largest_below_zero(double a, double fa, double b, double fb, Function f) 
   return a;
 }
 
-// Acceleration and jerk first, then velocity, then position: each lowers the bound that those before it leave.
+// Acceleration and jerk first, then velocity, then position: each limit lowers the bound that the limits before it
+// leave.
 class Upper {
  public:
   explicit Upper(const JerkState& state) noexcept : s_(state) {}
@@ -56,13 +57,13 @@ class Upper {
   // The highest velocity of a stop that starts with velocity v and this slope.
   double peak(double v, double slope) const noexcept { return v + square(std::max(0.0, slope)) / (2.0 * s_.jerk); }
 
-  // By how much a stop after velocity v overshoots the position limit on its way, and where it ends.
+  // How far a stop after velocity v overshoots the position limit on the way (overshoot), and at its end (end).
   double overshoot(double v) const noexcept {
     return v + JerkStop(v, slope_at(v), s_.jerk, s_.braking).rise() - s_.room;
   }
   double end(double v) const noexcept { return v + JerkStop(v, slope_at(v), s_.jerk, s_.braking).distance() - s_.room; }
 
-  // The next sample of the fastest way to the steady velocity v, with the slope that suits that way best.
+  // The next sample of the fastest way to the steady velocity v, with the best slope that the jerk limit allows.
   double settling(double v) const noexcept {
     const double j = s_.jerk, cap = s_.acceleration;
     const double excess = s_.v - v, slope = std::copysign(std::sqrt(2.0 * j * std::abs(excess)), -excess);
@@ -96,7 +97,8 @@ class Upper {
     out_.kind = LimitKind::Velocity;
   }
 
-  // A cheap test that mostly suffices: from its peak v a stop takes no longer than v / A + A / j, at v/2 on average.
+  // A cheap test that usually suffices: from its peak v a stop takes no longer than v / A + A / j, at a mean velocity
+  // of v/2.
   bool far_from_position_limit() const noexcept {
     const double j = s_.jerk, braking = s_.braking;
     const double slope = std::max(0.0, slope_at(out_.bound)), fast = out_.bound + 0.5 * slope * slope / j;
@@ -124,7 +126,7 @@ class Upper {
                                                : largest_below_zero(s_.next, next_beyond, out_.bound, beyond, f);
   }
 
-  // The joint will be outside: back with the recovery speed, until a stop ends on the limit or before.
+  // The joint will be outside: it comes back with the recovery speed until a stop ends on the limit or inside.
   void come_back(double next_beyond) noexcept {
     out_.safe = out_.bound = s_.next;
     out_.broken = out_.broken || next_beyond > s_.slack;

@@ -1,6 +1,6 @@
 #pragma once
-// The bound on the next velocity of a joint with a jerk limit: one after which it can still stop inside all limits.
-// limits.hpp says why there always is one.
+// The bound on the next velocity of a joint with a jerk limit: after this velocity the joint can still stop inside all
+// limits. limits.hpp says why such a bound always exists.
 
 #include <algorithm>
 
@@ -8,20 +8,20 @@
 
 namespace sigmaik::detail {
 
-inline constexpr double kLimitTolerance = 1e-9;  // relative: what is beyond a limit by less is rounding
+inline constexpr double kLimitTolerance = 1e-9;  // relative: a smaller excess over a limit is rounding
 
 // A joint with a jerk limit. Its mirror image (all signs turned) gives the lower bound.
 struct JerkState {
   double v, change;         // velocity, and its change in the last cycle
   double next, next_slope;  // next sample of the stop that is kept, and its slope there
   double room;              // to the upper position limit [velocities × cycles]
-  double slack;             // of that room: what is beyond by less is rounding
+  double slack;             // of the room: a smaller excess is rounding
   double velocity, acceleration, braking, jerk, recovery;
 };
 
 struct JerkBound {
-  double safe;   // no higher than this, or a limit is broken, or broken worse
-  double bound;  // lower than that where the joint must come back
+  double safe;   // a higher velocity breaks a limit, or breaks it more
+  double bound;  // lower than `safe` where the joint must come back
   LimitKind kind;
   bool broken;
 };
@@ -29,8 +29,8 @@ struct JerkBound {
 JerkBound upper_bound(const JerkState& state) noexcept;
 
 // The line of choices (limits.hpp): the slope with which v is chosen after v_k. The line goes through the next sample
-// of the stop that is kept, else as near to that sample as |slope − (v − v_k)| ≤ j/2 allows, so that stopping is as
-// easy as can be. Written as a difference to that sample, because v − v_k is rounded.
+// of the stop that is kept, else as near to this sample as |slope − (v − v_k)| ≤ j/2 allows, which makes stopping as
+// easy as possible. The slope is computed from the difference to this sample, because v − v_k is rounded.
 inline double slope_of(double v, double v_k, double next, double next_slope, double j) noexcept {
   const double change = next - v_k - next_slope;
   return v >= next ? next_slope + std::max(0.0, v - next + std::min(0.0, change - 0.5 * j))

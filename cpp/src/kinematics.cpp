@@ -7,7 +7,7 @@ namespace {
 
 using detail::FrameColumns;
 
-// To the tip.
+// Walks along the whole chain, to the tip.
 template <typename Visit>
 Pose walk_to_tip(const Chain& chain, const JointRef& q, Visit joint) noexcept {
   FrameColumns f = detail::walk(chain, q, joint);

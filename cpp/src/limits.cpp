@@ -17,7 +17,7 @@ namespace {
 using detail::kInfinity;
 using detail::kLimitTolerance;
 using detail::require;
-// Braking is planned this much weaker than it may be, so that the plan can make up for rounding on the way.
+// Relative reserve of the planned deceleration: the plan can then make up for rounding on the way.
 constexpr double kBrakingReserve = 1e-10;
 constexpr double kSnap = 1e-12;  // [1 + rad or m] rounding of positions as they add up
 
@@ -38,8 +38,8 @@ struct LimitTracker::Window {
   double lower, upper;
   LimitKind lower_kind, upper_kind;
 
-  // Narrows the window to [low, high], low ≤ high. Where the two do not meet, the end that is nearest to [low, high] is
-  // left: each window gives way to those before it.
+  // Narrows the window to [low, high], low ≤ high. Where the two do not intersect, the end nearest to [low, high] is
+  // left: each limit gives way to the limits before it.
   void narrow(double low, double high, LimitKind kind) noexcept {
     if (high < upper) {
       upper = std::max(high, lower);
@@ -75,7 +75,7 @@ LimitTracker::LimitTracker(const JointLimits& limits, double dt, const LimitOpti
   for (const auto& [what, values] : positive) {
     require(values->size() == n_, what, " has ", values->size(), " entries, lower ", n_);
   }
-  // Beyond n_, numbers that no vector operation stumbles over: blocks of a fixed size are read and written.
+  // Beyond n_ are numbers that are harmless in every operation, because blocks of a fixed size are read and written.
   lower_.fill(-1.0);
   for (Numbers* x : {&upper_, &velocity_, &acceleration_, &jerk_, &recovery_}) x->fill(1.0);
   for (int i = 0; i < n_; ++i) {
@@ -186,7 +186,8 @@ unsigned LimitTracker::survey() noexcept {
   const Block most = v + a;
   const Block upper = most.min(limit), lower = (v - a).max(-limit);
   const Block up = upper.max(0.0), down = (-lower).max(0.0);
-  // A position limit matters where D(v) ≤ v²/2A + v/2 + A/8 does not fit before it; NaN where A is infinite.
+  // A position limit matters where the bound D(v) ≤ v²/2A + v/2 + A/8 exceeds the room to the limit; NaN where A is
+  // infinite.
   const Block room = 2.0 * per_dt_ * a * (Column(upper_.data()) - q).min(q - Column(lower_.data()));
   const Block spare = room - up.max(down) * (up.max(down) + a) - 0.25 * a * a;
   const Block slow = limit - v.abs();
@@ -260,7 +261,7 @@ LimitTracker::Window LimitTracker::window(int i, bool& broken) const noexcept {
   Window window = motor;
   window.narrow(-limit, limit, LimitKind::Velocity);
 
-  // D(v) ≤ v²/2A + v/2 + A/8: mostly the limits are farther away than that.
+  // D(v) ≤ v²/2A + v/2 + A/8: usually the limits are farther away than this bound.
   const double above = room_above(i), below = room_below(i);
   const auto matters = [&](double fast, double room) {
     if (fast <= 0.0) return room < 0.0;

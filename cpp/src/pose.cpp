@@ -36,7 +36,7 @@ Eigen::Matrix3d rotation_exp(const Eigen::Vector3d& vector) noexcept {
 
 Eigen::Vector3d rotation_exp_rate(const Eigen::Vector3d& vector, const Eigen::Vector3d& rate) noexcept {
   const double square = vector.squaredNorm(), angle = std::sqrt(square);
-  // Below, the next term of each series is less than rounding, and the quotients begin to lose digits.
+  // Below this angle, the next term of each series is less than rounding, and the quotients begin to lose digits.
   const bool small = angle < 1e-2;
   const double sine = std::sin(0.5 * angle);
   const double a = small ? 0.5 - square / 24.0 + square * square / 720.0 : 2.0 * sine * sine / square;

@@ -22,7 +22,7 @@ void split_range(std::size_t count, int threads, const Work& work) {
   std::size_t started = 1;
   try {
     for (; started < workers; ++started) pool.emplace_back(work, part(started), part(started + 1));
-  } catch (const std::system_error&) {  // no more threads to be had: the rest is done here
+  } catch (const std::system_error&) {  // the system gives no more threads: this thread does the rest
   }
   work(0, part(1));
   work(part(started), count);

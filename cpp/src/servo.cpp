@@ -33,7 +33,7 @@ void check_joints(const char* what, const JointRef& values, const Chain& chain) 
   }
 }
 
-// What ServoStep says of the singular directions; their columns u_i are in the rows of the task.
+// The singular directions as twists. The solution gives their columns u_i in the rows of the task.
 TwistColumns singular_twists(const Solution& solution, const Task& task, const Eigen::Matrix3d& rotation,
                              double length_scale) noexcept {
   TwistColumns out(6, solution.singular_count());
@@ -161,7 +161,7 @@ ServoStep Servo::resolve(const Twist& twist, bool fade) noexcept {
     limit(step);
     rule = false;
   }
-  // Without velocity limits, a huge twist can move the arm beyond all numbers.
+  // Without velocity limits, a huge twist can move the arm beyond the range of the numbers.
   if (!detail::finite(tracker_.q() + options_.dt * step.qdot) || !detail::finite(step.achieved_twist)) {
     return stop(Status::BadInput);
   }
@@ -169,7 +169,8 @@ ServoStep Servo::resolve(const Twist& twist, bool fade) noexcept {
   return step;
 }
 
-// Counts the time since reset(), and mixes the first commands with the velocity there. Whether it changed the command.
+// Counts the time since reset(), and mixes the first commands with the velocity there. Returns whether the command
+// changed.
 bool Servo::fade_in(JointVector& qdot, bool fade) noexcept {
   if (fade_ >= 1.0) return false;
   fade_ = options_.soft_start > 0.0 ? std::min(1.0, fade_ + options_.dt / options_.soft_start) : 1.0;

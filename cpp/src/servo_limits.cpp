@@ -1,4 +1,4 @@
-// What joint limits leave of the rule's answer: where the arm heads, and how far it gets there in this cycle.
+// Joint limits change the rule's answer: they bound the heading, and the part of the way that fits into this cycle.
 
 #include <algorithm>
 #include <cmath>
@@ -9,16 +9,16 @@
 namespace sigmaik {
 namespace {
 
-// A twist that misses this part of itself counts as done.
+// A twist counts as done if no more than this part of it is missing.
 constexpr double kDone = 1e-4;
 
-// from + s (to − from) for the largest s in [0, 1] that is inside the bounds; where no s is, for the largest s that is
-// nearest to them. Sets the bits of the joints that decide s.
+// from + s (to − from) for the largest s in [0, 1] that is inside the bounds; if no s is inside, for the largest of
+// those nearest to the bounds. Sets the bits of the joints that decide s.
 JointVector furthest(const JointVector& from, const JointVector& to, const VelocityBounds& bounds,
                      std::uint16_t& limiting) noexcept {
   const auto n = from.size();
   const JointVector way = to - from;
-  // By more than rounding.
+  // Whether joint i moves by more than rounding.
   const auto moves = [&](Eigen::Index i) { return std::abs(way[i]) > 1e-12 * std::abs(from[i]); };
   double least = 0.0, s = 1.0;
   for (Eigen::Index i = 0; i < n; ++i) {
@@ -29,7 +29,7 @@ JointVector furthest(const JointVector& from, const JointVector& to, const Veloc
   }
   const bool meets = s >= least;
   if (!meets) {
-    // Half the derivative of the squared distance never falls.
+    // Half the derivative of the squared distance does not decrease with s, so bisection finds its zero.
     const double size = way.cwiseAbs().maxCoeff();
     const auto slope = [&](double at) {
       double sum = 0.0;
@@ -55,7 +55,7 @@ JointVector furthest(const JointVector& from, const JointVector& to, const Veloc
     if (beyond || more > bounds.upper[i] || more < bounds.lower[i]) limiting |= static_cast<std::uint16_t>(1u << i);
     rounded = rounded && (!beyond || moves(i));
   }
-  return rounded ? at.cwiseMax(bounds.lower).cwiseMin(bounds.upper) : at;  // not by rounding beyond what it meets
+  return rounded ? at.cwiseMax(bounds.lower).cwiseMin(bounds.upper) : at;  // rounding must not exceed a bound
 }
 
 }  // namespace
@@ -67,7 +67,7 @@ void Servo::limit(ServoStep& step) noexcept {
   judge(asked, step);
 }
 
-// Position and velocity limits: the velocity at which to arrive, in time.
+// Position and velocity limits: the command becomes a velocity inside the heading bounds.
 void Servo::head(ServoStep& step) noexcept {
   const VelocityBounds heading = tracker_.heading();
   if (heading.contain(step.qdot)) return;
@@ -79,7 +79,7 @@ void Servo::head(ServoStep& step) noexcept {
   }
 }
 
-// Acceleration and jerk limits: how much of the way from the last velocity to the heading fits into this cycle.
+// Acceleration and jerk limits: the command becomes the part of the way to the heading that fits into this cycle.
 void Servo::approach(ServoStep& step) noexcept {
   const VelocityBounds& bounds = tracker_.bounds();
   if (bounds.contain(step.qdot)) return;
@@ -90,10 +90,11 @@ void Servo::approach(ServoStep& step) noexcept {
   step.qdot = step.qdot.cwiseMax(bounds.lower).cwiseMin(bounds.upper);
 }
 
-// How much of the rule's twist is left, along itself and in the weights of the rule, and how much is missed at all.
+// Measures how much of the rule's twist is left, along this twist and in the weights of the rule, and whether any is
+// missing.
 void Servo::judge(const JointVector& asked, ServoStep& step) const noexcept {
   const Spectrum& spectrum = solver_.spectrum();
-  // Divided by the largest entry, so that squares do not overflow.
+  // Velocities are divided by the largest entry, so that squares do not overflow.
   const double size = std::max(asked.cwiseAbs().maxCoeff(), std::numeric_limits<double>::min());
   double along = 0.0, whole = 0.0, missed = 0.0;
   for (int i = 0; i < spectrum.size(); ++i) {

@@ -109,7 +109,7 @@ int ServoLoop::configure(Servo next, bool restart) {
   require(!restart || next.q().size() != 0, "the servo has no start: call reset(q) first");
   const std::lock_guard lock(callers_);
   sweep();
-  // A servo that never began: its successor starts where it would have.
+  // If the waiting servo never runs, its successor starts where that servo would have started.
   Driver* const driver = new Driver{std::move(next), ++configurations_, restart};
   Driver* const skipped = incoming_.exchange(nullptr, std::memory_order_acq_rel);
   if (skipped != nullptr && skipped->restart && !restart) {
@@ -127,7 +127,7 @@ void ServoLoop::take_over() noexcept {
   if (!next->restart) next->servo.continue_from(driver_->servo);
   Driver* const old = std::exchange(driver_, next);
   old->next = done_.load(std::memory_order_relaxed);
-  // Others only take all there is: this fails once at most for each time they do.
+  // Other threads only take the whole list, so the exchange fails at most once for each time they do.
   while (!done_.compare_exchange_weak(old->next, old, std::memory_order_release, std::memory_order_relaxed)) {
   }
 }

@@ -9,12 +9,13 @@ namespace sigmaik {
 namespace {
 
 // Weight of joint motion against twist, as a part of σ_max. The weight bounds how fast joints move to make up for
-// little twist where the remaining joints come to a singularity of their own: with a hundredth of it the arm swings.
+// little twist where the remaining joints come to a singularity of their own: with a hundredth of this weight the arm
+// swings.
 constexpr double kJointWeight = 1e-2;
-// With this weight λ, the twist of a direction with σ_i misses (λ/σ_i)² of itself; a second pass from the answer, the
-// square of that.
+// With this weight λ, the twist of a direction with σ_i misses (λ/σ_i)² of itself; after a second pass from the answer,
+// the square of this part.
 constexpr int kPasses = 2;
-// Weight of the rows that come first, against the others.
+// Weight of the exact rows against the other rows.
 constexpr double kExactWeight = 1e3;
 
 // Σ w_i u_i v_iᵀ, w_i = max(σ_i, threshold σ_max): how much each direction counts. With S = Σ w_i u_i v_iᵀ, J-PARSE's q̇
@@ -44,11 +45,11 @@ JointVector Servo::redistribute(const JointVector& qdot, const VelocityBounds& b
     return nearest(qdot, rows_, rows_.lazyProduct(qdot), largest, qdot, bounds, step);
   }
 
-  // The exact rows first, by themselves.
+  // First, the problem has the exact rows alone.
   const TaskJacobian first = exact_rows(regular);
   const JointVector begin = nearest(qdot, first, first.lazyProduct(qdot), exact_spectrum_.sigma(0), qdot, bounds, step);
 
-  // Then all rows, with so much weight on the exact ones that their part stays.
+  // Then the problem has all rows, with so much weight on the exact rows that their part stays.
   weigh(spectrum, regular, rows_);
   TaskVector goal = rows_.lazyProduct(qdot);
   int row = 0, exact_row = 0;
@@ -76,11 +77,11 @@ TaskJacobian Servo::exact_rows(double regular) noexcept {
   return rows;
 }
 
-// Inside the bounds, min |rows q̇ − goal|² + λ² |q̇ − begin|², and once more from the answer in place of `begin`.
+// Minimises |rows q̇ − goal|² + λ² |q̇ − begin|² inside the bounds, then once more with the answer in place of `begin`.
 JointVector Servo::nearest(const JointVector& begin, const TaskJacobian& rows, const TaskVector& goal, double largest,
                            const JointVector& asked, const VelocityBounds& bounds, ServoStep& step) noexcept {
-  // In x = q̇ − begin and a slack s for the twist still missed: min |x|² + |s|² where rows x + λ s = missed. That is one
-  // level of least squares, and does not square the rows.
+  // In x = q̇ − begin and a slack s for the twist still missed: min |x|² + |s|² where rows x + λ s = missed. This form
+  // is one level of least squares, and does not square the rows.
   const auto m = rows.rows(), n = rows.cols();
   problem_.C.setZero(m, n + m);
   problem_.C.leftCols(n) = rows;

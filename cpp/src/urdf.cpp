@@ -55,7 +55,7 @@ void read_limits(const TreeJoint& from, const urdf::Joint& joint, Segment& segme
   const XMLElement* const limit = from.element->FirstChildElement("limit");
   if (limit == nullptr) return;  // a continuous joint: urdfdom requires <limit> of all other types
   segment.velocity = none_if_zero(joint.limits->velocity);
-  // URDF wants an effort, so 0 is how files leave it out; a velocity of 0 may be meant.
+  // URDF requires an effort, so files write 0 for an unknown effort; a velocity of 0 may be intended and gets a note.
   if (joint.limits->velocity == 0.0 && limit->Attribute("velocity") != nullptr) {
     segment.notes.push_back(from.label() +
                             ": velocity = 0 counts as no limit; a joint that does not move is of type fixed");
@@ -68,7 +68,7 @@ void read_limits(const TreeJoint& from, const urdf::Joint& joint, Segment& segme
   if (segment.type == JointType::Continuous) return;
   segment.lower = none_if_huge(joint.limits->lower);
   segment.upper = none_if_huge(joint.limits->upper);
-  // Both default to 0 in URDF, and the joint could not move.
+  // Both bounds default to 0 in URDF, and the joint could not move.
   require(limit->Attribute("lower") != nullptr || limit->Attribute("upper") != nullptr, from.label(),
           ": <limit> gives neither lower nor upper; a joint that turns without end is of type continuous");
   require(segment.lower != segment.upper, from.label(), ": lower = upper = ", segment.lower,

@@ -13,7 +13,7 @@ namespace {
 // Part of the command that the answer may miss and still be exact.
 constexpr double kExact = 1e-9;
 
-// The answer to what cannot be solved: no motion, BadInput.
+// The answer where the question cannot be solved: no motion, BadInput.
 Solution refuse(const TaskJacobianRef& jacobian) noexcept {
   Solution s;
   const auto m = std::min<Eigen::Index>(jacobian.rows(), kMaxTask);
@@ -145,7 +145,7 @@ Solution VelocitySolver::answer(const Question& question, const TaskVector& comm
   return s;
 }
 
-// An exact rule is not enough: a posture that its projector lets through moves the tip, and large speeds round.
+// An exact rule is not enough: a posture that passes the rule's projector moves the tip, and large speeds are rounded.
 bool VelocitySolver::exact(const Question& question, const TaskVector& achieved, double tolerance) const noexcept {
   TaskVector missed = achieved - question.twist;
   if (question.select) missed = select_rows(task_, question.rotation, Twist(missed));

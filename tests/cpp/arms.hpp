@@ -9,7 +9,7 @@
 
 namespace test {
 
-/// By name, up to their flange.
+/// The arms by name, up to their flange.
 inline const std::map<std::string, sigmaik::Chain>& arms() {
   static const std::map<std::string, sigmaik::Chain> all = [] {
     std::map<std::string, sigmaik::Chain> found;

@@ -1,6 +1,6 @@
 #pragma once
-// Counts what goes to the heap, by standing in for malloc and its kin. Include it in one file of an executable:
-// operator new, Eigen's aligned allocation and libraries then come here too.
+// Counts calls to the heap, by standing in for malloc and the functions of its family. Include it in one file of an
+// executable: the calls of operator new, Eigen's aligned allocation and libraries are then counted too.
 //
 //     const test::HeapWatch watch;
 //     solver.solve(j, twist);
@@ -69,7 +69,7 @@ int posix_memalign(void** block, std::size_t alignment, std::size_t size) {
 
 namespace test {
 
-/// Calls to the heap by this thread since it was made.
+/// Calls to the heap by this thread since the watch was made.
 class HeapWatch {
  public:
   long calls() const { return heap_calls - start_; }

@@ -14,7 +14,7 @@ inline std::vector<sigmaik::Method> library_methods() {
   return out;
 }
 
-/// These, and the others of their modes.
+/// The library's methods, and the others of their modes.
 inline std::vector<sigmaik::Method> all_methods() {
   using namespace sigmaik;
   std::vector<Method> out = library_methods();

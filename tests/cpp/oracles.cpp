@@ -27,10 +27,6 @@ MatrixXd null_space(const MatrixXd& a) {
   return MatrixXd(qr.matrixQ()).rightCols(a.cols() - qr.rank());
 }
 
-MatrixXd orthonormal_basis(const MatrixXd& a) {
-  return Eigen::HouseholderQR<MatrixXd>(a).householderQ() * MatrixXd::Identity(a.rows(), a.cols());
-}
-
 MatrixXd solve(const MatrixXd& a, const MatrixXd& b) { return Eigen::HouseholderQR<MatrixXd>(a).solve(b); }
 
 MatrixXd cholesky(const MatrixXd& a) { return a.llt().matrixL(); }

@@ -18,25 +18,23 @@ struct Svd {
 };
 Svd svd(const MatrixXd& a);
 
-/// From large to small.
+/// The singular values, from large to small.
 VectorXd singular_values(const MatrixXd& a);
 LongVector singular_values(const LongMatrix& a);
 
-/// The shortest x of those with the least |a x − b|.
+/// The shortest x among those with the least |a x − b|.
 VectorXd least_squares(const MatrixXd& a, const VectorXd& b);
 MatrixXd pseudo_inverse(const MatrixXd& a);
 int rank(const MatrixXd& a);
-/// Orthonormal columns that span what a sends to zero.
+/// Orthonormal columns that span the null space of a.
 MatrixXd null_space(const MatrixXd& a);
 
-/// Orthonormal columns that span the columns of a: Householder's Q.
-MatrixXd orthonormal_basis(const MatrixXd& a);
 /// x with a x = b, for a square regular a.
 MatrixXd solve(const MatrixXd& a, const MatrixXd& b);
 /// L with L Lᵀ = a.
 MatrixXd cholesky(const MatrixXd& a);
 
-/// From small to large, of a symmetric a.
+/// The eigenvalues of a symmetric a, from small to large.
 VectorXd eigenvalues(const MatrixXd& a);
 /// λ with a x = λ b x, for symmetric a and positive definite b.
 VectorXd generalised_eigenvalues(const MatrixXd& a, const MatrixXd& b);

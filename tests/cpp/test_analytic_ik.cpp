@@ -1,5 +1,5 @@
 // Closed-form inverse kinematics: every posture of random poses of the shipped and of random arms, against forward
-// kinematics and Newton's method; singular poses of each kind; limits and turns; what is refused.
+// kinematics and Newton's method; singular poses of each kind; limits and turns; arms and input that are refused.
 
 #include <doctest/doctest.h>
 
@@ -17,6 +17,7 @@
 #include <sigmaik/pose.hpp>
 
 #include "heap.hpp"
+#include "numbers.hpp"
 #include "oracles.hpp"
 #include "random.hpp"
 
@@ -36,10 +37,10 @@ using sigmaik::JointVector;
 using sigmaik::Pose;
 using sigmaik::Segment;
 using sigmaik::SixJoints;
+using test::kInfinity;
 using test::Random;
 
 constexpr double kPi = std::numbers::pi;
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 const char* const kShipped[] = {"kuka_kr6_r900", "comau_racer_7_1_4", "puma560"};
 
 static_assert(noexcept(std::declval<const AnalyticIk&>().solve(std::declval<const Pose&>())));
@@ -63,7 +64,7 @@ Vector3d apart_from(Random& random, const Vector3d& other, double least) {
   }
 }
 
-// Anything that qualifies; `classical`: right angles, axes 1 and 2 that meet, and arms whose links have one length.
+// Any arm that qualifies; `classical`: right angles, axes 1 and 2 that meet, and arms whose links have one length.
 Layout layout(Random& random, bool classical) {
   Layout l;
   const auto point = [&] { return Vector3d(0.5 * random.vector(3)); };
@@ -99,7 +100,8 @@ Layout layout(Random& random, bool classical) {
   return l;
 }
 
-// Frames anywhere along the axes and turned at random, a fixed joint on the way, random zeros, base and tool.
+// A chain with frames anywhere along the axes and turned at random, a fixed joint on the way, random zeros, base and
+// tool.
 Chain chain_of(Random& random, const Layout& l, double size = 1.0, double mounting = 1.0) {
   std::vector<Segment> segments;
   Pose last = Pose::Identity();
@@ -147,7 +149,7 @@ Chain unlimited(const Chain& chain) {
 
 // ---- Measures -------------------------------------------------------------------------------------------------------
 
-// Largest difference of joints, whole turns apart being the same.
+// Largest difference of joints, where whole turns do not count.
 double apart(const SixJoints& a, const SixJoints& b) {
   double largest = 0.0;
   for (int i = 0; i < 6; ++i) largest = std::max(largest, std::abs(std::remainder(a[i] - b[i], 2.0 * kPi)));
@@ -182,7 +184,7 @@ double closest_pair(const AnalyticSolutions& s) {
   return least;
 }
 
-// How far from singular: the factors of the Jacobian's determinant, by shoulder, elbow and wrist, from the Jacobian.
+// The distance from singularities: the factors of the Jacobian's determinant, by shoulder, elbow and wrist.
 Vector3d factors(const Chain& chain, const SixJoints& q) {
   sigmaik::ChainState state;
   REQUIRE(sigmaik::update(chain, q, state));
@@ -235,7 +237,7 @@ bool make_singular(const Chain& chain, int which, SixJoints& q, Random& random) 
 
 SixJoints configuration(Random& random) { return random.configuration(6); }
 
-// Each branch reproduces the pose, q is among them, no two are one.
+// Checks that each branch reproduces the pose, that q is among the branches, and that no two branches are equal.
 void check_regular(const Chain& chain, const AnalyticIk& ik, const SixJoints& q) {
   const Pose pose = sigmaik::pose(chain, q);
   const AnalyticSolutions s = ik.solve(pose);
@@ -294,7 +296,7 @@ TEST_CASE("random arms: any angles, offsets, signs, zeros, frames, bases and too
   for (const int count : {0, 1, 3, 5, 7}) CHECK(counts[count] == 0);
 }
 
-TEST_CASE("size and mounting cost no digits but their own") {
+TEST_CASE("a large arm or a far mounting costs only the digits of its own rounding") {
   Random random(3);
   for (const double size : {1e-3, 1.0, 1e3}) {
     for (const double mounting : {0.0, 1.0, 1e3}) {
@@ -315,7 +317,7 @@ TEST_CASE("size and mounting cost no digits but their own") {
   }
 }
 
-TEST_CASE("Newton's method from random starts finds no posture that is not listed, and all that are") {
+TEST_CASE("Newton's method from random starts finds all listed postures, and no others") {
   Random random(4);
   std::vector<Chain> arms;
   for (const char* const name : kShipped) arms.push_back(load(name));
@@ -411,7 +413,7 @@ TEST_CASE("singular poses: shoulder, elbow, wrist and all together") {
       for (int repeat = 0; repeat < 4; ++repeat) {
         SixJoints q = configuration(random);
         bool there = true;
-        // The elbow does not change what the shoulder then needs, nor do both the wrist.
+        // In this order no move changes a factor that is already zero.
         for (const int which : {1, 0, 2}) {
           if ((kinds >> which & 1u) != 0) there = there && make_singular(chain, which, q, random);
         }
@@ -419,7 +421,7 @@ TEST_CASE("singular poses: shoulder, elbow, wrist and all together") {
         const Vector3d factor = factors(chain, q).cwiseAbs();
         bool clear = true;  // of the other singularities
         for (int which = 0; which < 3; ++which) clear = clear && ((kinds >> which & 1u) != 0 || factor[which] > 3e-3);
-        // Folded onto axis 2, every q2 will do, and is at the shoulder or not.
+        // Folded onto axis 2, the arm reaches the pose with every q2, and is singular at the shoulder for some of them.
         if (!clear) continue;
         CAPTURE(kinds);
         CAPTURE(q.transpose());
@@ -437,7 +439,7 @@ TEST_CASE("singular poses: shoulder, elbow, wrist and all together") {
         CHECK(closest_pair(s) > 1e-6);
         CHECK(s.count < 8);
 
-        // What the pose leaves free stays as it is.
+        // An angle that the pose leaves free stays as it is.
         const AnalyticNearest near = ik.nearest(pose, q);
         REQUIRE(near.status == AnalyticStatus::Ok);
         CHECK((near.branch.singular & kinds) == kinds);
@@ -466,7 +468,7 @@ TEST_CASE("numbers of postures at singular poses of the KUKA") {
   q[4] = kPi;
   CHECK(count(q) == 7);
   q[4] = 0.9;
-  q[2] = bend;  // stretched; turned about by half a turn, the arm cannot reach so far
+  q[2] = bend;  // stretched; with the shoulder turned by half a turn, the arm cannot reach so far
   CHECK(count(q) == 2);
   q[2] = bend - kPi;  // folded
   CHECK((count(q) == 2 || count(q) == 6));
@@ -478,9 +480,9 @@ TEST_CASE("numbers of postures at singular poses of the KUKA") {
   const AnalyticSolutions s = ik.solve(sigmaik::pose(chain, q));
   for (const AnalyticBranch& branch : s) {
     CHECK(branch.singular == sigmaik::kShoulderSingular);
-    CHECK(branch.q[0] == 0.0);  // free, and told so
+    CHECK(branch.q[0] == 0.0);  // free, and reported as free
   }
-  // The free angle is free.
+  // Every value of the free angle reaches the pose.
   for (double angle = -3.0; angle < 3.0; angle += 0.37) {
     SixJoints near = q;
     near[0] = angle;
@@ -515,7 +517,7 @@ TEST_CASE("a free joint 1 turns to where an oblique wrist can do the rest") {
   CHECK(found == checked);
 }
 
-TEST_CASE("close to singular poses, answers stay as good") {
+TEST_CASE("answers stay as exact close to singular poses") {
   Random random(8);
   std::vector<Chain> arms;
   for (const char* const name : kShipped) arms.push_back(load(name));
@@ -534,7 +536,7 @@ TEST_CASE("close to singular poses, answers stay as good") {
       CAPTURE(q.transpose());
       const Pose pose = sigmaik::pose(chain, q);
       const AnalyticSolutions s = ik.solve(pose);
-      if (s.status != AnalyticStatus::Ok) {  // at the corner of three reaches, oblique wrists lose a few
+      if (s.status != AnalyticStatus::Ok) {  // at the corner of three reaches, oblique wrists lose a few poses
         CHECK_FALSE(right_angled);
         CHECK(factors(chain, q).cwiseAbs().maxCoeff() < 1e-6);
         ++lost;
@@ -586,7 +588,7 @@ TEST_CASE("out of reach by the wrist's orientation, and in the hole around axis 
     const AnalyticIk ik(chain);
     const SixJoints q = configuration(random);
     Pose pose = sigmaik::pose(chain, q);
-    // Another orientation about the wrist centre: what comes back must reach it, or say that none does.
+    // Another orientation about the wrist centre: all answers must reach it, or there is none.
     sigmaik::ChainState state;
     sigmaik::update(chain, q, state);
     for (int i = 0; i < 40; ++i) {
@@ -654,7 +656,7 @@ struct Turned {
   bool fits;
 };
 
-// Of the turns of `angle`, the one within limits that is nearest to `near`; where there is none, the nearest of all.
+// The turn of `angle` within the limits that is nearest to `near`; if none is within, the nearest turn of all.
 Turned turned(double angle, double near, double lower, double upper) {
   Turned best{angle, false};
   for (int k = -20; k <= 20; ++k) {
@@ -736,7 +738,7 @@ TEST_CASE("turns of the KUKA's wrist") {
   const Pose pose = sigmaik::pose(chain, q);
   CHECK(ik.nearest(pose, q).branch.within_limits);
   CHECK((ik.nearest(pose, q).branch.q - q).cwiseAbs().maxCoeff() < 1e-12);
-  // Further than joint 6 goes: it must come back by a turn, where the others leave no other way.
+  // Beyond the range of joint 6: joint 6 must come back by a turn, where the other joints leave no other way.
   SixJoints beyond = q, back = q;
   beyond[5] = 6.2;
   back[5] = 6.2 - 2.0 * kPi;
@@ -758,7 +760,7 @@ TEST_CASE("turns of the KUKA's wrist") {
     CHECK(branch.within_limits);
   }
   CHECK(found);
-  // Many turns, where nothing limits them.
+  // Many turns, where nothing limits the joints.
   const Chain free = unlimited(chain);
   SixJoints far = q;
   far[5] = 100.0;
@@ -772,7 +774,7 @@ TEST_CASE("a joint on its limit is within it, and stays there") {
   for (int i = 0; i < 500; ++i) {
     const SixJoints q = configuration(random);
     if (!regular(kuka, q, 1e-2)) continue;
-    // Where each joint is the end of its own range, on one or the other side, whatever rounding does.
+    // Each joint is at an end of its own range, the lower or the upper end, whatever rounding does.
     JointVector lower = q, upper = q;
     for (int j = 0; j < 6; ++j) {
       if (random.chance(0.5)) {
@@ -804,7 +806,7 @@ TEST_CASE("nearest follows a path") {
       SixJoints last = along(0.0);
       for (int i = 1; i <= 500; ++i) {
         const SixJoints q = along(0.004 * i);
-        if (!regular(chain, q, 1e-3)) {  // its neighbours merge with it here: another may be nearer
+        if (!regular(chain, q, 1e-3)) {  // the neighbours of q merge with it here: another branch may be nearer
           last = q;
           continue;
         }
@@ -864,7 +866,7 @@ TEST_CASE("a free angle keeps to the limits") {
   CHECK(found);
 }
 
-// ---- What is refused ------------------------------------------------------------------------------------------------
+// ---- Refusals -------------------------------------------------------------------------------------------------------
 
 namespace {
 
@@ -923,7 +925,7 @@ TEST_CASE("arms of other kinds are refused, with the facts") {
     l.o[3] = l.o[4] = l.o[5] = l.o[2] + 0.3 * l.h[2];
     check_refused(chain_of(random, l), "the wrist centre lies on axis 3");
 
-    // Below the tolerance: accepted, and as exact as that.
+    // Below the tolerance: the arm is accepted, and its answers are as exact as the tolerance.
     l = good;
     l.h[2] = (l.h[2] + 1e-10 * l.h[2].unitOrthogonal()).normalized();
     l.o[5] += 1e-10 * l.h[5].unitOrthogonal();

@@ -78,7 +78,7 @@ TEST_CASE("bit for bit a loop of fresh solvers, any size, any number of threads"
   }
 }
 
-TEST_CASE("what is not finite gives zero, and harms no neighbour") {
+TEST_CASE("a problem that is not finite gives zero, and does not change the others") {
   Random random(2);
   for (const int threads : {1, 3}) {
     Problem p = random_problem(random, 30, 6, 7);
@@ -96,7 +96,7 @@ TEST_CASE("what is not finite gives zero, and harms no neighbour") {
   }
 }
 
-TEST_CASE("an empty batch is nothing to do") {
+TEST_CASE("an empty batch does nothing") {
   for (const int threads : {1, 4})
     CHECK_NOTHROW(solve_batch(JParse{}, 1.0, {0, 6, 7}, nullptr, nullptr, nullptr, nullptr, threads));
 }

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <tuple>
 #include <utility>
 #include <vector>
@@ -12,16 +11,17 @@
 #include <sigmaik/planning/cart.hpp>
 #include <sigmaik/planning/cart_motion.hpp>
 
+#include "numbers.hpp"
 #include "random.hpp"
 
 using namespace sigmaik;
 using namespace sigmaik::planning;
 using Eigen::VectorXd;
+using test::kInfinity;
 using test::Random;
 
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kPi = 3.14159265358979323846;
 
 PlanarPath line(double x0, double y0, double x1, double y1, int samples) {
@@ -45,7 +45,7 @@ PlanarPath wave(Random& random, int samples, double waves, double size) {
   return path;
 }
 
-// The library's functions, which take and give std::vectors, on Eigen's.
+// Wrappers of the library's functions, which take and give std::vectors, for Eigen's vectors.
 VectorXd vector_of(const std::vector<double>& v) {
   return Eigen::Map<const VectorXd>(v.data(), static_cast<Eigen::Index>(v.size()));
 }
@@ -219,7 +219,7 @@ TEST_CASE("the law keeps out of the region and is optimal for its sides, over th
         if (mu < -1e-13) CHECK((law.x[i] == law.lower[i] || law.x[i] == options.upper));
       }
       both += above > 0 && below > 0;
-      // The law is straight between corners: its polygon has the turn that is told.
+      // The law is straight between corners: its polygon has the turn that the law reports.
       CHECK(law.turn == doctest::Approx(turn_of(path, law.x)).epsilon(tip ? 1e3 : 1e-9));
       for (std::size_t j = 0; j < law.regions.size(); ++j) {
         const CartRegion& region = law.regions[j];
@@ -240,7 +240,7 @@ TEST_CASE("the law keeps out of the region and is optimal for its sides, over th
   CHECK(refused > 100);
 }
 
-TEST_CASE("branch and bound finds what going through all sides finds") {
+TEST_CASE("branch and bound finds the same law as trying all sides") {
   Random random(4);
   int several = 0, turned = 0;
   for (int trial = 0; trial < 400; ++trial) {
@@ -339,7 +339,7 @@ TEST_CASE("a larger circle costs more, and any other law is faster") {
       const Law law = law_of(path, start, end, r);
       CHECK(law.energy >= energy * (1.0 - 1e-12));
       energy = law.energy;
-      // Least top speed: nobody keeps on this side at a lower one.
+      // The least top speed: no law on this side has a lower one.
       double top = 0.0;
       for (std::size_t c = 0; c + 1 < law.corners.size(); ++c) {
         top = std::max(top, std::abs(law.corner_x[c + 1] - law.corner_x[c]) / (law.corners[c + 1] - law.corners[c]));
@@ -406,7 +406,7 @@ TEST_CASE("limits of speed and acceleration are kept, at tips between samples to
   CHECK(tips > 100);
 }
 
-TEST_CASE("tips and whole regions between samples are kept out of") {
+TEST_CASE("the law keeps out of tips and whole regions between samples") {
   // The law would hook around the end of the region, which lies between two samples.
   int hooks = 0;
   for (int k = 0; k < 50; ++k) {
@@ -419,7 +419,7 @@ TEST_CASE("tips and whole regions between samples are kept out of") {
     while (law.corners[after] < tip) ++after;
     const double t0 = law.corners[after - 1], t1 = law.corners[after];
     const double x0 = law.corner_x[after - 1], x1 = law.corner_x[after];
-    CHECK(x0 + (x1 - x0) * (tip - t0) / (t1 - t0) >= -1e-12);  // at the tip above P's x, 0
+    CHECK(x0 + (x1 - x0) * (tip - t0) / (t1 - t0) >= -1e-12);  // at the tip the cart passes above P's x, 0
     hooks += t1 == tip;
   }
   CHECK(hooks > 10);
@@ -435,7 +435,7 @@ TEST_CASE("tips and whole regions between samples are kept out of") {
   CHECK(law.turn == doctest::Approx(2.0 * kPi - 2.0 * std::atan2(1.0, -0.05)).epsilon(1e-9));
 }
 
-TEST_CASE("what cannot be done is told apart") {
+TEST_CASE("the fault tells why there is no law") {
   const auto fault = [](const PlanarPath& path, double start, double end, double r, const CartOptions& options = {}) {
     try {
       law_of(path, start, end, r, options);
@@ -452,14 +452,14 @@ TEST_CASE("what cannot be done is told apart") {
   CHECK(radius == doctest::Approx(std::hypot(0.1, 0.15)).epsilon(1e-8));
   std::tie(why, radius) = fault(over, 0.5, -0.1, 0.2);
   CHECK(why == CartFault::EndInside);
-  CHECK(radius == doctest::Approx(0.15).epsilon(1e-8));  // and on opposite sides, above that
+  CHECK(radius == doctest::Approx(0.15).epsilon(1e-8));  // above this radius the ends are also on opposite sides
   std::tie(why, radius) = fault(over, 0.5, -0.5, 0.2);
   CHECK(why == CartFault::OppositeSides);
   CHECK(radius == doctest::Approx(0.15).epsilon(1e-8));
   std::tie(why, radius) = fault(through, 0.02, 0.02, 0.2, {.lower = -0.1, .upper = 0.12});
   CHECK(why == CartFault::Range);
   CHECK(radius == doctest::Approx(0.12).epsilon(1e-8));
-  // Above the region P is seen to turn over π, from +y to −y: positive.
+  // Above the region P is seen to turn over π, from +y to −y: the turn is positive.
   std::tie(why, radius) = fault(through, 0.02, 0.02, 0.2, {.turn = 9.0});
   CHECK(why == CartFault::Winding);
   CHECK(std::isnan(radius));
@@ -475,7 +475,7 @@ TEST_CASE("what cannot be done is told apart") {
   CHECK(why == CartFault::Acceleration);
   std::tie(why, radius) = fault(line(0.0, 0.5, 0.0, 0.5, 2), 0.0, 1.0, 0.2, {.max_acceleration = 0.2, .at_rest = true});
   CHECK(why == CartFault::Acceleration);
-  // A part of the region that begins at a tip between the last two samples: which side it is on is told by the end.
+  // A part of the region begins at a tip between the last two samples: the end tells on which side the cart passes it.
   CHECK(law_of(line(0.0, 0.5, 0.0, 0.15, 8), -0.9, 0.16, 0.2).regions[0].side == 1);
   CHECK(law_of(line(0.0, 0.5, 0.0, 0.15, 8), 0.9, -0.16, 0.2).regions[0].side == -1);
 

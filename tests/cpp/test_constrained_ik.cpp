@@ -1,10 +1,9 @@
-// ConstrainedIk against Schreiber, Otter and Hirzinger's equations, and against what it promises: limits held, the
-// exact part exact, the rest as well as can be, time scaling, torques, and the closed form where it will do.
+// ConstrainedIk against the equations of Schreiber, Otter and Hirzinger, and against its promises: limits held, the
+// exact part exact, the rest as good as possible, time scaling, torques, and the closed form where it is allowed.
 
 #include <doctest/doctest.h>
 
 #include <cmath>
-#include <limits>
 #include <map>
 #include <string>
 
@@ -12,17 +11,17 @@
 #include <sigmaik/error.hpp>
 #include <sigmaik/pose.hpp>
 
+#include "numbers.hpp"
 #include "oracles.hpp"
 #include "random.hpp"
 
 using namespace sigmaik;
+using test::kInfinity;
 using test::MatrixXd;
 using test::Random;
 using test::VectorXd;
 
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 Chain arm(const std::string& name) { return Chain::from_urdf(SIGMAIK_ROBOTS_DIR "/" + name + ".urdf"); }
 
@@ -69,7 +68,7 @@ VectorXd constrained(const MatrixXd& A, const VectorXd& b, const MatrixXd& C, co
 
 }  // namespace
 
-TEST_CASE("one linearisation is equation (25) with (26), whatever is exact, weighed, and in which axes") {
+TEST_CASE("one linearisation is equation (25) with (26), for any exact rows, weights and axes") {
   Random random(1);
   int compared = 0;
   for (int repeat = 0; repeat < 3000; ++repeat) {
@@ -98,7 +97,7 @@ TEST_CASE("one linearisation is equation (25) with (26), whatever is exact, weig
     if (o.task.frame == Frame::Tool) {
       axes.topLeftCorner(3, 3) = axes.bottomRightCorner(3, 3) = state.tip.linear().transpose();
     }
-    // The Jacobian of the error by differences: the rotation's part is not the geometric one.
+    // The Jacobian of the error by differences: its rotational rows are not those of the geometric Jacobian.
     const Twist error = -pose_error(state.tip, target);
     MatrixXd slope(6, n);
     for (int j = 0; j < n; ++j) {
@@ -123,14 +122,14 @@ TEST_CASE("one linearisation is equation (25) with (26), whatever is exact, weig
     MatrixXd C = MatrixXd::Zero(6 - ap, unknowns);
     C.leftCols(n) = exact(slope);
     const VectorXd d = -exact(error);
-    // Motion from the tip to the target changes the error by −error exactly: J_l⁻¹(φ) maps it onto itself.
+    // Motion from the tip to the target changes the error by exactly −error: J_l⁻¹(φ) maps φ onto itself.
     if (scaled) {
       A.col(n).head(ap) = alpha.asDiagonal() * rest(motion);
       C.col(n) = exact(motion);
       A(2 * ap, n) = *o.gamma;
     }
     const VectorXd x = constrained(A, b, C, d);
-    if (scaled && (x[n] < 1e-6 || x[n] > 1.0 - 1e-6)) continue;  // its bounds are another test's
+    if (scaled && (x[n] < 1e-6 || x[n] > 1.0 - 1e-6)) continue;  // another test covers the bounds of ϑ
     const auto conditioned = [](const MatrixXd& m, double least) {
       if (m.rows() == 0) return true;
       const VectorXd sigma = test::singular_values(m);
@@ -201,7 +200,8 @@ TEST_CASE("errors decay by β²/(α²+β²) a cycle, and the exact part is exact
     ik.step(target);  // the first step's motion is the whole way, so nothing is left
     ConstrainedIkStep step = ik.step(target);
     CHECK(step.error.norm() < 1e-5);
-    // A start off the target that is not the target's motion: hold the old target, then let the arm be elsewhere.
+    // A start off the target that does not come from the target's motion: limits hold the arm back on its way to a far
+    // target.
     ConstrainedIkOptions tight = o;
     tight.limits.velocity = true;
     JointLimits limits = chain.limits();
@@ -227,7 +227,7 @@ TEST_CASE("errors decay by β²/(α²+β²) a cycle, and the exact part is exact
   }
 }
 
-TEST_CASE("limits hold, the answer is never missing, and what is exact gives way last") {
+TEST_CASE("limits hold, there is always an answer, and the exact part gives way last") {
   Random random(4);
   for (const std::string name : {"kuka_kr6_r900", "ufactory_xarm7", "franka_panda", "comau_racer_7_1_4"}) {
     const Chain chain = arm(name);
@@ -274,7 +274,8 @@ TEST_CASE("time scaling: none where none is needed; all six rows exact: the path
   o.gamma = 1.0;
   o.exact.fill(true);
   o.analytic = false;
-  // How fast the path can be taken further on is not known to a step, so with these it may be too fast to brake.
+  // A step does not know how fast the path can be followed later on, so with acceleration limits the arm may be too
+  // fast to brake.
   o.limits.acceleration = false;
   ConstrainedIk ik(chain, o);
   JointVector home(6);
@@ -296,7 +297,7 @@ TEST_CASE("time scaling: none where none is needed; all six rows exact: the path
     most = std::max(most, step.time_scale);
     CHECK(step.path_error.head<3>().norm() < 2e-5);
     CHECK(step.path_error.tail<3>().norm() < 2e-5);
-    CHECK(std::abs(step.error[0]) < 1e-4);  // off the line
+    CHECK(std::abs(step.error[0]) < 1e-4);  // distance from the line
     ++cycles;
   }
   CHECK(most > 0.5);
@@ -321,7 +322,7 @@ TEST_CASE("the largest error allowed is kept where it can be together with the e
   o.analytic = false;
   o.gamma = 0.1;
   o.max_error.tail<3>().setConstant(0.01);
-  o.limits.acceleration = false;  // with them a step that cannot see ahead is at times too fast to keep it
+  o.limits.acceleration = false;  // with them a step, which cannot see ahead, may be too fast to keep max_error
   ConstrainedIk ik(chain.with_limits(limits), o);
   JointVector home(6);
   home << 0.0, -1.3, 1.5, 0.0, 0.15, 0.0;

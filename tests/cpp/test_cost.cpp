@@ -30,7 +30,7 @@ JointVector inside(Random& random, const Chain& chain) {
   return q;
 }
 
-// A cost of a user's own: all that it takes.
+// A cost of a user's own, with no more than such a cost needs.
 struct NearHome {
   double weight = 1.0;
 
@@ -54,7 +54,7 @@ struct NearHome {
   }
 };
 
-// One that has no Hessian, as one that is asked for all states at once.
+// A cost that has no Hessian, because it is evaluated for all states at once.
 class Linear final : public BatchCost {
  public:
   explicit Linear(int dof) : dof_(dof) {}
@@ -156,7 +156,7 @@ TEST_CASE("the planners in one call are the planners") {
   CHECK_THROWS_WITH_AS(gradient(chain, inside(random, chain), inside(random, chain), {}), "there is no cost", Error);
 }
 
-TEST_CASE("a cost of a user's own draws motions to where it is low") {
+TEST_CASE("motions go to where a user's own cost is low") {
   Random random(6);
   const Chain& chain = test::arms().at("kuka_lbr_iiwa_14_r820");
   const JointVector start = inside(random, chain), goal = inside(random, chain);

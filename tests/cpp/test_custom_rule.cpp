@@ -1,4 +1,4 @@
-// A rule that an application brings: through the same solver and servo as the library's own, at the same answers.
+// An application's own rule runs through the same solver and servo as the library's rules, with the same answers.
 #include <doctest/doctest.h>
 
 #include <string>
@@ -108,7 +108,7 @@ TEST_CASE("a servo drives by an application's rule, inside limits, to the librar
   }
 }
 
-TEST_CASE("an application's rule is checked when a solver, a servo or a change of method takes it") {
+TEST_CASE("an application's rule is checked when a solver, a servo or a change of method receives it") {
   const auto refuses = [](const Method& method, const char* what) {
     try {
       const VelocitySolver solver(method);
@@ -119,7 +119,7 @@ TEST_CASE("an application's rule is checked when a solver, a servo or a change o
     }
   };
   refuses(OwnDls{0.0}, "OwnDls: lambda must be above 0");
-  // CustomRule by name: a rule that derives from one of the library would be taken as that one.
+  // Named CustomRule, because a rule that derives from a rule of the library would be taken as the library's rule.
   refuses(CustomRule(OwnJParse{JParse{2.0}}), "OwnJParse: gamma = 2 must be finite and above 0 and at most 1");
   for (const double bad : {0.0, -0.1, 1.1}) refuses(NoThreshold{bad}, "NoThreshold: relative_threshold() = ");
   VelocitySolver solver(OwnDls{});

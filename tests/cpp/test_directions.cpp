@@ -1,4 +1,4 @@
-// The singular directions of a cycle: those of the rule, as twists in base axes.
+// The singular directions of a cycle are those of the rule, as twists in base axes.
 
 #include <doctest/doctest.h>
 
@@ -24,7 +24,7 @@ const std::vector<Method> kMethods{PseudoInverse{1e-2},
                                    AdaptiveDampedLeastSquares{.rule = DampingRule::SmallestSingularValue},
                                    AdaptiveDampedLeastSquares{.rule = DampingRule::Manipulability}};
 
-// (m', 6): from a twist in base axes to the weighted rows of the task.
+// (m', 6): maps a twist in base axes to the weighted rows of the task.
 Eigen::MatrixXd task_rows(const Task& task, double length_scale, const Eigen::Matrix3d& rotation) {
   Eigen::MatrixXd turn = Eigen::MatrixXd::Identity(6, 6);
   if (task.frame == Frame::Tool) {
@@ -69,7 +69,7 @@ TEST_CASE("a cycle's singular directions are the rule's, for every method, task 
     CHECK(step.singular == solution.singular);
     REQUIRE(step.singular_directions.cols() == solution.singular_count());
 
-    // In the rows of the task they are the solver's u_i, and there is nothing in the other rows.
+    // In the rows of the task the directions are the solver's u_i; in the other rows they are zero.
     const Eigen::MatrixXd rows = task_rows(options.task, options.length_scale, rotation);
     Task others = options.task;
     for (bool& row : others.mask) row = !row;
@@ -82,7 +82,7 @@ TEST_CASE("a cycle's singular directions are the rule's, for every method, task 
       ++seen;
     }
 
-    // And they span what another decomposition says, where the singular values are well apart.
+    // The directions span the space that another decomposition finds, where the singular values are well apart.
     const test::Svd svd = test::svd(rows * state.jacobian);
     Eigen::MatrixXd span(rows.rows(), 0);
     double gap = 1.0;

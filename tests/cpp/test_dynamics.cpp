@@ -22,7 +22,7 @@ using test::VectorXd;
 
 namespace {
 
-// A few point masses: whatever their places, a body.
+// A few point masses, which are a body whatever their places are.
 Inertia body(Random& random) {
   Inertia result;
   Eigen::Matrix3Xd points(3, 4);
@@ -62,7 +62,7 @@ TEST_CASE("inverse and forward dynamics are each other's inverse, and M q̈ + C 
     const double scale = 1.0 + torque.cwiseAbs().maxCoeff();
     CHECK((torque - sum).cwiseAbs().maxCoeff() < 1e-11 * scale);
     REQUIRE(dynamics.forward_dynamics(q, qdot, torque, back));
-    const VectorXd again = dynamics.mass_matrix(q) * (back - qddot);  // free of M's condition number
+    const VectorXd again = dynamics.mass_matrix(q) * (back - qddot);  // without M's condition number
     CHECK(again.cwiseAbs().maxCoeff() < 1e-10 * scale);
     DynamicsTerms terms;
     dynamics.evaluate(q, qdot, terms);
@@ -187,7 +187,7 @@ TEST_CASE("computed torque stays within effort limits, and answers bad input") {
   REQUIRE(dynamics.forward_dynamics(q, zero, far.torque, truly));
   CHECK((truly - far.scale * asked).cwiseAbs().maxCoeff() < 1e-9 * asked[0]);  // the direction is kept
   const double most = (far.torque.cwiseAbs().array() / chain.limits().effort.array()).maxCoeff();
-  CHECK(most == doctest::Approx(1.0).epsilon(1e-12));  // and no more is given up than must be
+  CHECK(most == doctest::Approx(1.0).epsilon(1e-12));  // no more is given up than necessary
 
   const ComputedTorqueStep brake = control.update(q, qdot, bad, zero, zero);
   JointVector expected;

@@ -45,14 +45,14 @@ TEST_CASE("values are those of the definitions") {
     const TaskMatrix given = positive(random, m);
     const double xi = IndexFunction(Index::GeometryAware, {.sigma = given}).value(j);
     CHECK(xi == doctest::Approx(distance(gram, given)).epsilon(1e-7));
-    // Affine invariance: M → AMAᵀ, Σ → AΣAᵀ. And the distance from M to I is that from M⁻¹.
+    // Affine invariance: M → AMAᵀ, Σ → AΣAᵀ. The distance from M to I is also the distance from M⁻¹ to I.
     const MatrixXd a = random.matrix(m, m) + 3.0 * MatrixXd::Identity(m, m);
     TaskMatrix moved = a * given * a.transpose();
     moved = 0.5 * (moved + moved.transpose()).eval();
     CHECK(IndexFunction(Index::GeometryAware, {.sigma = moved}).value(a * j) == doctest::Approx(xi).epsilon(1e-6));
     const MatrixXd inverse = test::pseudo_inverse(j).transpose();
     CHECK(geometry_aware(inverse, 1.0) == doctest::Approx(geometry_aware(j, 1.0)).epsilon(1e-8));
-    // Nothing at Σ itself.
+    // The distance is zero at Σ itself.
     const MatrixXd root = test::cholesky(given);
     CHECK(IndexFunction(Index::GeometryAware, {.sigma = given}).value(root) < 1e-18);
   }
@@ -119,7 +119,7 @@ TEST_CASE("gradients") {
       Jacobian weighted = state.jacobian;
       weighted.bottomRows<3>() *= options.length_scale;
       const VectorXd sigma = test::singular_values(MatrixXd(weighted));
-      // σ_1 and σ_6 have derivatives where they are simple, and differences tell them where they are not too curved.
+      // σ_1 and σ_6 have derivatives where they are simple, and differences find these where they are not too curved.
       if (sigma[5] < 1e-2 * sigma[0]) continue;
       const bool simple = sigma[4] - sigma[5] > 1e-2 * sigma[0] && sigma[0] - sigma[1] > 1e-2 * sigma[0];
       if (!simple && (index == Index::MinSingularValue || index == Index::ConditionNumber)) continue;

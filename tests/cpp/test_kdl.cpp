@@ -38,7 +38,7 @@ class Random {
   bool chance(double p) { return uniform(0.0, 1.0) < p; }
   Eigen::Vector3d vector(double size) { return {uniform(-size, size), uniform(-size, size), uniform(-size, size)}; }
 
-  // As arms have them: often a coordinate axis, sometimes almost one, of any length.
+  // Axes as arms have them: often a coordinate axis, sometimes almost a coordinate axis, of any length.
   Eigen::Vector3d axis() {
     Eigen::Vector3d axis = vector(1.0);
     if (chance(0.5)) {
@@ -101,7 +101,7 @@ KDL::Frame frame_of(const Pose& pose) {
           vector_of(pose.translation())};
 }
 
-// Not by to_kdl(): each origin as a fixed segment, each joint at zero.
+// The oracle does not use to_kdl(): each origin is a fixed segment, each joint is at zero.
 KDL::Chain oracle(const std::vector<Segment>& segments) {
   KDL::Chain chain;
   for (const Segment& s : segments) {
@@ -371,7 +371,7 @@ TEST_CASE("from KDL: no names, no limits") {
     links.push_back(s.link_name);
     CHECK_FALSE(s.inertia.has_value());
   }
-  // Only the third's tip lies off its axis.
+  // Only the tip of the third segment lies off its joint's axis.
   CHECK(links == std::vector<std::string>{"link1", "link2", "link3_joint", "link3", "joint4", "link5_"});
   CHECK(chain.joint_types() ==
         std::vector<JointType>{JointType::Revolute, JointType::Revolute, JointType::Prismatic, JointType::Revolute});

@@ -1,26 +1,25 @@
-// Bounded least squares by what makes an answer the answer: level by level, the gradient of what is minimised lies in
-// the cone of the constraints that hold it. An independent non-negative least squares (Lawson and Hanson 1974, ch. 23)
-// measures the distance from that cone, so that degenerate and rank-deficient problems need no exception.
+// Bounded least squares by the conditions of optimality: level by level, the gradient of the objective lies in the cone
+// of the constraints that hold it. An independent non-negative least squares (Lawson and Hanson 1974, ch. 23) measures
+// the distance from this cone, so that degenerate and rank-deficient problems need no exception.
 
 #include <doctest/doctest.h>
 
-#include <limits>
 #include <vector>
 
 #include <sigmaik/least_squares.hpp>
 
 #include "heap.hpp"
+#include "numbers.hpp"
 #include "oracles.hpp"
 #include "random.hpp"
 
 using namespace sigmaik;
+using test::kInfinity;
 using test::MatrixXd;
 using test::Random;
 using test::VectorXd;
 
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // min |E y − f|, y ≥ 0, by Lawson and Hanson's algorithm. Returns the residual's length.
 double distance_to_cone(const MatrixXd& E, const VectorXd& f) {

@@ -1,23 +1,23 @@
-// Bounds on the joint velocity: that they hold the limits for ever, give up no more than they must, and lead back.
+// Bounds on the joint velocity hold the limits for ever, give up no more than necessary, and lead back into the limits.
 
 #include <doctest/doctest.h>
 
-#include <limits>
 #include <vector>
 
 #include <sigmaik/error.hpp>
 #include <sigmaik/limits.hpp>
 
 #include "heap.hpp"
+#include "numbers.hpp"
 #include "random.hpp"
 
 namespace {
 
 using namespace sigmaik;
+using test::kInfinity;
+using test::kNan;
 using test::Random;
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kTolerance = 1e-9;
 
 double ulp(double x) { return std::nextafter(std::abs(x), kInfinity) - std::abs(x); }
@@ -50,7 +50,7 @@ double draw_position(Random& random, const JointLimits& limits, int i) {
   return random.chance(0.2) ? lower : random.chance(0.2) ? upper : random.uniform(lower, upper);
 }
 
-// What may be chosen inside the bounds, by accident or ill will.
+// Chooses velocities inside the bounds, at random or with the worst intentions.
 class Chooser {
  public:
   Chooser(Random& random, double dt, double q)
@@ -84,7 +84,7 @@ class Chooser {
   double dwell_;
 };
 
-// What a controller would check, with the rounding of differences.
+// The checks of a robot's controller, with the rounding of differences.
 class Checker {
  public:
   Checker(const JointLimits& limits, double dt, const JointVector& q, const JointVector& v)
@@ -113,9 +113,9 @@ class Checker {
   JointVector q_, v_, a_, fastest_;
 };
 
-// From rest over a distance, in continuous time.
+// The least time from rest over a distance, in continuous time.
 double least_time(double distance, double v, double a, double j) {
-  const auto ramp = [&](double speed) {  // to that speed
+  const auto ramp = [&](double speed) {  // time to reach this speed
     return std::isinf(j) ? speed / a : speed >= a * a / j ? speed / a + a / j : 2.0 * std::sqrt(speed / j);
   };
   if (std::isfinite(v) && v * ramp(v) <= distance) return 2.0 * ramp(v) + (distance - v * ramp(v)) / v;
@@ -215,7 +215,7 @@ TEST_CASE("from outside: acceleration and jerk hold, speed falls, the joint come
         order += !(lower <= upper);
         const double low = std::clamp(-20.0, lower, upper), high = std::clamp(20.0, lower, upper);
         const bool above = tracker.q()[0] > 0.0;
-        JointVector choice = one(policy == 0   ? (above ? high : low)  // as slowly as allowed
+        JointVector choice = one(policy == 0   ? (above ? high : low)  // as slow as allowed
                                  : policy == 1 ? high
                                  : policy == 2 ? low
                                                : random.uniform(low, high));
@@ -245,7 +245,7 @@ TEST_CASE("from outside: acceleration and jerk hold, speed falls, the joint come
   }
 }
 
-TEST_CASE("no more is given up than must be: a limit is reached in the least time, exactly, and kept") {
+TEST_CASE("no more is given up than necessary: a limit is reached in the least time, exactly, and kept") {
   Random random(5);
   for (int run = 0; run < 250; ++run) {
     const double dt = random.decades(-4.0, -2.0), distance = random.decades(-2.0, 1.0);
@@ -291,7 +291,8 @@ TEST_CASE("without a jerk limit: the largest velocity from which braking, cycle 
     LimitTracker tracker(limits, dt);
     tracker.reset(one(0.0), one(a * dt * 2.0 * (steps + 1.0)));  // too fast …
     CHECK(tracker.recovering() == 1);
-    // … so bounded by acceleration; the position's bound is where a slower start meets it.
+    // … so its velocity is bounded by acceleration; the position's bound is the velocity at which a slower start meets
+    // it.
     double low = 0.0, high = a * dt * 2.0 * (steps + 1.0);
     const auto braking = [&](double v) {
       double sum = 0.0;
@@ -357,7 +358,7 @@ TEST_CASE("bounds are continuous in the state, out of the limits too") {
       LimitTracker a(limits, dt), b(limits, dt);
       a.reset(one(q), one(v));
       b.reset(one(q + 1e-12 * random.normal()), one(v + 1e-12 * random.normal()));
-      // Positions count by 1/dt, and near limits the bounds are roots.
+      // Positions are divided by dt, and near limits the bounds are roots.
       const double near = 1e-11 / dt + (with_jerk ? 1e-5 * dt * std::sqrt(limits.jerk[0]) : 0.0);
       CAPTURE(run);
       CHECK(std::abs(a.bounds().upper[0] - b.bounds().upper[0]) < near);
@@ -411,7 +412,7 @@ TEST_CASE("limits can be left out, and a joint that is outside moves in faster i
   CHECK(fast.stop()[0] == -1.0);
 }
 
-TEST_CASE("what is not a number, or of a wrong size, stops the joint as the limits let it") {
+TEST_CASE("a velocity that is no number, or of a wrong size, stops the joint within the limits") {
   JointLimits limits = no_limits(2);
   limits.acceleration.setConstant(10.0);
   limits.jerk[1] = 100.0;

@@ -91,7 +91,7 @@ TEST_CASE("the field at its nodes, between them and outside") {
       const Vector3d node = field.origin() + cell * cells;
       REQUIRE(field.distance(node) == doctest::Approx(balls(node)).epsilon(1e-6));
     }
-    // Outside: a bound of the distance to what is inside, and one that grows.
+    // Outside, the field is a lower bound of the distance to the obstacles in the grid, and the bound grows.
     for (int trial = 0; trial < 20000; ++trial) {
       const Vector3d p = in_box(random, {-3.0, -3.0, -3.0}, {3.0, 3.0, 3.0});
       const double d = field.distance(p);
@@ -127,7 +127,7 @@ TEST_CASE("the field's gradient is the slope of its distance") {
     Vector3d gradient, expected;
     const double d = field.distance(p, gradient);
     REQUIRE(d == doctest::Approx(field.distance(p)).epsilon(1e-12));
-    // Not across a cell's face.
+    // The step does not cross a cell's face.
     const Eigen::Array3d cells = (p - field.origin()).array() / field.cell();
     if (((cells - cells.round()).abs() < 1e-4).any()) continue;
     for (int axis = 0; axis < 3; ++axis) {
@@ -365,7 +365,7 @@ TEST_CASE("self-collision cost") {
     const std::vector<SpherePair> pairs = self_collision_pairs(spheres);
     CHECK(pairs == self_collision_pairs(spheres));
     CHECK(pairs.size() > 100);
-    // No pair is near by its make: most configurations cost nothing.
+    // No pair of spheres is near by design: most configurations cost nothing.
     const JointCostPtr narrow = self_collision_cost(spheres, pairs, 0.02);
     int free = 0;
     for (int trial = 0; trial < 200; ++trial) {

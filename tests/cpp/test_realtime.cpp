@@ -20,7 +20,7 @@
 
 namespace {
 
-// No allocation by Eigen while it lives.
+// Eigen must not allocate while this object lives.
 class NoMalloc {
  public:
   NoMalloc() { Eigen::internal::set_is_malloc_allowed(false); }

@@ -1,29 +1,29 @@
-// The rules: against their formulas, their bounds, their continuity, and everything that may be degenerate.
-// tests/python/test_rules.py compares them with the papers' matrix forms, on decompositions of LAPACK's.
+// The rules against their formulas, their bounds, their continuity, and all kinds of degenerate input.
+// tests/python/test_rules.py compares the rules with the papers' matrix forms, on decompositions of LAPACK's.
 
 #include <doctest/doctest.h>
 
-#include <limits>
 #include <string>
 
 #include <sigmaik/error.hpp>
 #include <sigmaik/rules.hpp>
 
 #include "methods.hpp"
+#include "numbers.hpp"
 #include "random.hpp"
 
 namespace {
 
 using namespace sigmaik;
+using test::kInfinity;
+using test::kNan;
 using test::MatrixXd;
 using test::Random;
 using test::VectorXd;
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr std::uint8_t kAngular = 0b111000;
 
-// The library's, and many more parameters.
+// The library's methods, and many more parameters.
 std::vector<Method> all_methods() {
   std::vector<Method> out = test::library_methods();
   for (const Method& method : std::initializer_list<Method>{
@@ -222,7 +222,7 @@ TEST_CASE("exact: says whether J q̇ is the command") {
   int exact = 0, inexact = 0;
   for (int repeat = 0; repeat < 3000; ++repeat) {
     const int m = random.integer(1, 6), n = random.integer(1, 16), k = std::min(m, n);
-    VectorXd sigma(k);  // well away from where rounding decides
+    VectorXd sigma(k);  // well away from values at which rounding decides
     for (int i = 0; i < k; ++i) {
       sigma[i] = random.chance(0.2) ? 0.0 : random.chance(0.2) ? random.decades(-6.0, -1.0) : random.uniform(0.3, 1.0);
     }
@@ -230,7 +230,7 @@ TEST_CASE("exact: says whether J q̇ is the command") {
     const MatrixXd j = random.with_singular_values(m, n, sigma);
     Spectrum s;
     s.decompose(j);
-    // Commands in general, and such as avoid what is singular.
+    // Commands in general, and commands that avoid the singular directions.
     VectorXd x = random.chance(0.3) ? random.vector(m) : VectorXd(j * random.vector(n));
     if (random.chance(0.3)) x = s.u(random.integer(0, m - 1));
     if (random.chance(0.05)) x.setZero();
@@ -269,7 +269,7 @@ TEST_CASE("no rule exceeds its bound, at the threshold, below it or at a singula
     s.decompose(random.with_singular_values(m, n, sigma));
     const double largest = s.sigma(0), k_linear = random.uniform(0.0, 3.0), k_angular = random.uniform(0.0, 3.0);
     VectorXd x = random.vector(m);
-    if (random.chance(0.5)) x = s.u(random.integer(0, m - 1));  // the worst that a rule can be asked
+    if (random.chance(0.5)) x = s.u(random.integer(0, m - 1));  // the worst command for a rule
     constexpr double kRounding = 1.0 + 1e-13;
     const auto norm = [&](const Method& method) { return qdot(s, resolve(method, s, x, kAngular)).norm() / x.norm(); };
     const auto largest_speed = [&](const Method& method) {
@@ -322,7 +322,7 @@ TEST_CASE("extreme Jacobians and commands: finite wherever the answer is a numbe
       const double size = random.decades(-320.0, 305.0);
       Spectrum s;
       s.decompose(MatrixXd(random.with_singular_values(m, n, test::random_singular_values(random, k, 1.0)) * size));
-      // The command in proportion, so that q̇ is a number; and a direction that is lost.
+      // The command is in proportion, so that q̇ is a finite number; and one direction is lost.
       const VectorXd x = random.vector(m) * std::min(size, 1.0) * random.decades(-3.0, 3.0);
       const Resolution r = resolve(method, s, x, kAngular);
       CAPTURE(label(method));

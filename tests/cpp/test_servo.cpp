@@ -1,9 +1,8 @@
-// The servo, cycle by cycle, on the shipped arms and on random ones: rules, starts, fades, postures. What limits do is
-// in test_servo_limits.cpp; here they are off, or far away, or those of velocity alone.
+// The servo, cycle by cycle, on the shipped arms and on random ones: rules, starts, fades, postures.
+// test_servo_limits.cpp tests the effect of limits; here limits are off, or far away, or limits of velocity alone.
 
 #include <doctest/doctest.h>
 
-#include <limits>
 #include <map>
 #include <numbers>
 
@@ -14,18 +13,18 @@
 #include "arms.hpp"
 #include "heap.hpp"
 #include "methods.hpp"
+#include "numbers.hpp"
 #include "random.hpp"
 
 namespace {
 
 using namespace sigmaik;
 using test::all_methods;
+using test::kInfinity;
+using test::kNan;
 using test::MatrixXd;
 using test::Random;
 using test::VectorXd;
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 using test::arms;
 
@@ -37,7 +36,7 @@ double singular_ratio(const Chain& chain, const JointVector& q) {
   return s.sigma(s.size() - 1) / s.sigma(0);
 }
 
-// Inside the limits, away from singularities.
+// A configuration inside the limits, away from singularities.
 JointVector regular_configuration(Random& random, const Chain& chain, double least_ratio = 0.08) {
   for (;;) {
     JointVector q(chain.dof());
@@ -53,14 +52,14 @@ bool same(const ServoStep& a, const ServoStep& b) {
          a.limiting_joints == b.limiting_joints && a.achieved_twist == b.achieved_twist;
 }
 
-// The rule and nothing else.
+// Options for the rule alone.
 ServoOptions free_options() {
   ServoOptions options;
   options.limits.position = options.limits.velocity = options.limits.acceleration = options.limits.jerk = false;
   return options;
 }
 
-// Velocity limits, by scaling.
+// Options for velocity limits alone, by scaling.
 ServoOptions scaled_options() {
   ServoOptions options = free_options();
   options.limits.velocity = true;
@@ -68,7 +67,7 @@ ServoOptions scaled_options() {
   return options;
 }
 
-// What every step must be, whatever was asked. Position limits count for joints that are inside.
+// Checks that hold for every step, whatever the command is. Position limits count for joints that are inside.
 void check_step(const Chain& chain, const ServoStep& step, const JointVector& before, const ServoOptions& options) {
   REQUIRE(step.qdot.size() == chain.dof());
   REQUIRE(step.q.size() == chain.dof());
@@ -92,7 +91,7 @@ void check_step(const Chain& chain, const ServoStep& step, const JointVector& be
 
 }  // namespace
 
-TEST_CASE("every arm reaches what it can reach") {
+TEST_CASE("every arm reaches each target that it can reach") {
   REQUIRE(arms().size() == 9);
   for (const auto& [key, chain] : arms()) {
     const std::string& name = key;
@@ -107,7 +106,7 @@ TEST_CASE("every arm reaches what it can reach") {
         for (int i = 0; i < chain.dof(); ++i) {
           goal[i] = std::clamp(goal[i] + random.uniform(-0.4, 0.4), chain.limits().lower[i], chain.limits().upper[i]);
         }
-      } while (singular_ratio(chain, goal) < 0.06);  // to a singular pose it takes its time
+      } while (singular_ratio(chain, goal) < 0.06);  // towards a singular pose the arm is slow
       const Pose target = pose(chain, goal);
       ServoOptions options;
       options.dt = 0.004;
@@ -120,7 +119,7 @@ TEST_CASE("every arm reaches what it can reach") {
         check_step(chain, step, before, options);
         before = step.q;
       }
-      const double near = step.limiting_joints == 0 ? 1e-6 : 1e-4;  // along a limit it takes longer
+      const double near = step.limiting_joints == 0 ? 1e-6 : 1e-4;  // along a limit the arm takes longer
       CHECK(step.pose_error.head<3>().norm() < near);
       CHECK(step.pose_error.tail<3>().norm() < near);
       CHECK((servo.tip().matrix() - target.matrix()).cwiseAbs().maxCoeff() < near);
@@ -129,7 +128,7 @@ TEST_CASE("every arm reaches what it can reach") {
   }
 }
 
-TEST_CASE("velocity limits: kept without tolerance, by scaling, and the joints named that asked for it") {
+TEST_CASE("velocity limits are kept without tolerance, by scaling, and the limiting joints are named") {
   Random random(2);
   int limited = 0;
   for (const auto& [key, shipped] : arms()) {
@@ -156,7 +155,7 @@ TEST_CASE("velocity limits: kept without tolerance, by scaling, and the joints n
         CHECK((step.achieved_twist - state.jacobian * step.qdot).norm() < 1e-14 * (1.0 + step.qdot.norm()));
         if (step.status == Status::Limited) {
           ++limited;
-          // What the rule alone would have said.
+          // The answer of the rule alone.
           Twist twist = pose_error(state.tip, target);
           CHECK(twist == step.pose_error);
           twist.head<3>() *= std::min(1.0, options.max_linear_error / twist.head<3>().norm()) * options.gain_linear;
@@ -194,7 +193,7 @@ TEST_CASE("one cycle, by the formula: gains, caps, posture and weights") {
       options.posture = regular_configuration(random, chain);
       options.posture_gain = random.uniform(0.0, 5.0);
       options.posture_max_speed = random.decades(-2.0, 1.0);
-      const Method method = DampedLeastSquares{random.decades(-2.0, 0.0)};  // lets some of everything through
+      const Method method = DampedLeastSquares{random.decades(-2.0, 0.0)};  // this rule damps every direction in part
       const JointVector start = regular_configuration(random, chain);
       const Pose target = pose(chain, regular_configuration(random, chain));
       Servo servo(chain, method, options);
@@ -241,7 +240,7 @@ TEST_CASE("without limits nothing is held back") {
   CHECK((step.qdot.cwiseAbs() - chain.limits().velocity).maxCoeff() > 0.0);
 }
 
-TEST_CASE("reset: no kick towards one's own pose, posture pinned") {
+TEST_CASE("reset: a target at the tip's own pose moves nothing, and the start is the posture") {
   Random random(4);
   for (const auto& [key, chain] : arms()) {
     const std::string& name = key;
@@ -265,7 +264,7 @@ TEST_CASE("reset: no kick towards one's own pose, posture pinned") {
   }
 }
 
-TEST_CASE("reset: everything before is forgotten") {
+TEST_CASE("reset forgets everything before it") {
   Random random(5);
   for (const auto& [key, chain] : arms()) {
     const std::string& name = key;
@@ -286,7 +285,7 @@ TEST_CASE("reset: everything before is forgotten") {
   }
 }
 
-TEST_CASE("soft start: a pose target's command grows from nothing, a twist's is there at once") {
+TEST_CASE("soft start: the command of a pose target grows from zero, a twist command acts at once") {
   Random random(6);
   for (const auto& [key, chain] : arms()) {
     const std::string& name = key;
@@ -314,7 +313,7 @@ TEST_CASE("soft start: a pose target's command grows from nothing, a twist's is 
   }
 }
 
-TEST_CASE("reset with a velocity: the command starts from how the arm moves") {
+TEST_CASE("reset with a velocity: the command starts from the arm's motion") {
   Random random(7);
   for (const auto& [key, chain] : arms()) {
     const std::string& name = key;
@@ -336,7 +335,7 @@ TEST_CASE("reset with a velocity: the command starts from how the arm moves") {
         CHECK((step.qdot - share * asked - (1.0 - share) * moving).norm() < 1e-6 * (1.0 + asked.norm()));
       }
     }
-    // Not even then are velocity limits broken, unless the motors cannot brake any faster.
+    // Even then no velocity limit is broken, unless the motors cannot brake any faster.
     const ServoOptions only_velocity = scaled_options();
     Servo limited(chain, JParse{}, only_velocity);
     limited.reset(start, JointVector(1e3 * moving));
@@ -349,7 +348,7 @@ TEST_CASE("reset with a velocity: the command starts from how the arm moves") {
   }
 }
 
-TEST_CASE("what is not a pose or a twist is refused, and without limits leaves no trace") {
+TEST_CASE("a target that is no pose or twist is refused, and leaves no trace where there are no limits") {
   Random random(8);
   for (const auto& [key, chain] : arms()) {
     const std::string& name = key;
@@ -403,7 +402,7 @@ TEST_CASE("before reset() the servo holds") {
   }
 }
 
-TEST_CASE("reset refuses wrong sizes and values, and keeps what there was") {
+TEST_CASE("reset refuses wrong sizes and values, and then changes nothing") {
   Random random(9);
   const Chain& chain = arms().at("ufactory_xarm7");
   Servo servo(chain, JParse{});
@@ -500,7 +499,7 @@ TEST_CASE("targets that jump: always finite, always within the limits, and reach
   }
 }
 
-TEST_CASE("out of reach for ten thousand cycles: stretched out, and still") {
+TEST_CASE("out of reach for ten thousand cycles the arm is stretched out and still") {
   for (const auto& [key, chain] : arms()) {
     const std::string& name = key;
     Random random(11);
@@ -529,14 +528,14 @@ TEST_CASE("out of reach for ten thousand cycles: stretched out, and still") {
       }
       CHECK(step.status == Status::Damped);
       CHECK(step.singular_values[5] < 0.1 * step.singular_values[0]);
-      // Four seconds: what is left is the slow creep of a singular approach, not jitter.
+      // After four seconds, only the slow creep of a singular approach is left, and no jitter.
       CHECK(late_path < 0.2);
       CHECK(most_turn < 1e-4);
     }
   }
 }
 
-TEST_CASE("a start at an exact singularity: what can move does, what cannot says so") {
+TEST_CASE("a start at an exact singularity: possible directions move, and the status reports the others") {
   int feasible = 0, infeasible = 0;
   for (const auto& [key, chain] : arms()) {
     const std::string& name = key;
@@ -643,12 +642,12 @@ TEST_CASE("twists are exact away from singularities") {
   }
 }
 
-TEST_CASE("zero commands: nothing moves, and that is as asked") {
+TEST_CASE("zero commands: nothing moves, and the status is Ok") {
   Random random(14);
   for (const auto& [name, chain] : arms()) {
     for (const Method& method : all_methods()) {
       ServoOptions options;
-      options.limits.position = false;  // from outside it would come back
+      options.limits.position = false;  // a joint outside would come back
       Servo servo(chain, method, options);
       servo.reset(random.chance(0.5) ? JointVector(JointVector::Zero(chain.dof()))
                                      : regular_configuration(random, chain));
@@ -691,7 +690,7 @@ TEST_CASE("the posture: moves the joints, not the tip; capped per joint; continu
     double from = 0.0, to = 0.0;
     for (int cycle = 0; cycle < 1000; ++cycle) {
       const ServoStep step = servo.update(own);
-      // As a projection the posture's motion is no larger than what was projected.
+      // The posture's motion is a projection, so it is no larger than the velocity that was projected.
       if (capped) CHECK(step.qdot.norm() <= 0.3 * std::sqrt(7.0) + 0.05);
       VectorXd away = options.posture - step.q;
       for (int i = 0; i < chain.dof(); ++i) {
@@ -701,7 +700,7 @@ TEST_CASE("the posture: moves the joints, not the tip; capped per joint; continu
       }
       (cycle == 0 ? from : to) = away.norm();
     }
-    if (!capped) CHECK(to < from);  // as the projected gradient of a distance; capped, it is no gradient
+    if (!capped) CHECK(to < from);  // the projected gradient of a distance; with the cap it is no gradient
     CHECK((servo.tip().matrix() - own.matrix()).cwiseAbs().maxCoeff() < 1e-3);
   }
   CHECK(continuous);
@@ -727,7 +726,7 @@ TEST_CASE("position only: the position is reached, the orientation is free") {
       ServoStep step;
       for (int cycle = 0; cycle < 2000; ++cycle) {
         step = servo.update(target);
-        REQUIRE((other.update(turned).q - step.q).norm() < 1e-9);  // what it asks for of the orientation is ignored
+        REQUIRE((other.update(turned).q - step.q).norm() < 1e-9);  // the target's orientation is ignored
         CHECK(step.singular_values.size() == 3);
       }
       CHECK(step.pose_error.head<3>().norm() < 1e-6);
@@ -760,7 +759,7 @@ TEST_CASE("with equal gains J-PARSE never increases the error, orientation inclu
     const double rate = -2.0 * error.dot(state.jacobian * qdot);
     CHECK(rate <= 1e-12 * error.squaredNorm() * 5.0);
     if (rate < -1e-3 * error.squaredNorm()) ++descents;
-    // The same by differences: eᵀe along the motion, the logarithm's own derivative included.
+    // The same by differences: eᵀe along the motion, with the derivative of the logarithm included.
     const double h = 1e-6 / (1.0 + qdot.norm());
     const Twist ahead = pose_error(pose(chain, JointVector(q + h * qdot)), target);
     const Twist behind = pose_error(pose(chain, JointVector(q - h * qdot)), target);
@@ -814,7 +813,7 @@ TEST_CASE("half a turn away: it turns, and arrives") {
   }
 }
 
-TEST_CASE("targets and twists beyond all measure") {
+TEST_CASE("targets and twists of any size") {
   Random random(20);
   for (const auto& [key, chain] : arms()) {
     const std::string& name = key;
@@ -849,7 +848,7 @@ TEST_CASE("targets and twists beyond all measure") {
       }
     }
   }
-  // Far away is far away: the arm goes there as fast as to any target out of reach.
+  // All targets far away are alike: the arm goes there as fast as to any target out of reach.
   const Chain& chain = arms().at("ufactory_xarm7");
   ServoOptions options = scaled_options();
   options.soft_start = 0.0;
@@ -1033,7 +1032,7 @@ TEST_CASE("a redundant arm moves away from singularities without moving its tool
         Servo servo(chain, JParse{}, options);
         servo.reset(q);
         const Pose target = pose(chain, q);
-        // What the servo descends: its value never rises but for what limits and the tool's hold take.
+        // The function that the servo descends: its value rises only by the effect of limits and of the tool's task.
         const auto height = [&](const JointVector& x) {
           return what == Avoid::Potential ? sets.potential(x, options.avoid.potential) : -sets.manipulability(x);
         };

@@ -1,12 +1,11 @@
-// What limits make of the servo's command: nothing while none is met; else the best that is left, without jumps; and a
-// way back from outside. The limits themselves are test_limits.cpp's.
+// The effect of limits on the servo's command: while no limit is met, there is none; else the command is the best that
+// is left, without jumps, and leads back from outside. test_limits.cpp tests the limits themselves.
 
 #include <doctest/doctest.h>
 
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <limits>
 #include <map>
 
 #include <sigmaik/constrained_ik.hpp>
@@ -17,18 +16,18 @@
 #include "arms.hpp"
 #include "heap.hpp"
 #include "methods.hpp"
+#include "numbers.hpp"
 #include "oracles.hpp"
 #include "random.hpp"
 
 namespace {
 
 using namespace sigmaik;
+using test::kInfinity;
+using test::kNan;
 using test::MatrixXd;
 using test::Random;
 using test::VectorXd;
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 using test::arms;
 
@@ -129,7 +128,7 @@ TEST_CASE("while no limit is met the answer is the rule's, to the last digit") {
   CHECK(same > 40000);
 }
 
-TEST_CASE("redistribution: the bounded least squares that it says, by its optimality conditions") {
+TEST_CASE("redistribution solves the bounded least squares of its description") {
   Random random(2);
   int cases = 0, several = 0;
   for (const auto& [key, shipped] : arms()) {
@@ -152,7 +151,7 @@ TEST_CASE("redistribution: the bounded least squares that it says, by its optima
       const VectorXd qdot = step.qdot, x = qdot - asked;
       ++cases;
 
-      // min |J x|² + λ² |x|², λ = σ_max/100, and once more from there: as the stacked problem that it is.
+      // min |J x|² + λ² |x|², λ = σ_max/100, and once more from the answer: as a stacked problem.
       const VectorXd sigma = test::singular_values(J);
       const double largest = sigma[0], lambda = 1e-2 * largest;
       LeastSquaresProblem problem;
@@ -174,7 +173,7 @@ TEST_CASE("redistribution: the bounded least squares that it says, by its optima
       CHECK(step.limiting_joints != 0);
       several += held > 1;
 
-      // So the tool is no farther off than with the rule's answer cut off.
+      // So the tool is no farther off than with each joint of the rule's answer cut off at its limit.
       const VectorXd cut = asked.cwiseMax(-limits.velocity).cwiseMin(limits.velocity);
       CHECK((J * x).norm() <= (J * (cut - asked)).norm() + lambda * (cut - asked).norm());
       CHECK((step.status == Status::Limited) == ((J * x).norm() > 1e-4 * (J * asked).norm()));
@@ -184,7 +183,7 @@ TEST_CASE("redistribution: the bounded least squares that it says, by its optima
   CHECK(several > 100);
 }
 
-TEST_CASE("redundant arms: the other joints take over all of it where they can") {
+TEST_CASE("redundant arms: the other joints take over the whole twist where they can") {
   Random random(3);
   int cases = 0, took_over = 0;
   for (const auto& [key, shipped] : arms()) {
@@ -249,7 +248,7 @@ TEST_CASE("exact rows are kept while the others give way, in base and in tool ax
       const Twist twist = 0.5 * random.unit(6);
       const VectorXd asked = rule(shipped, JParse{}, q, twist);
       const int i = random.integer(0, n - 1);
-      // Can the others do the first rows alone?
+      // Whether the other joints can do the first rows alone.
       MatrixXd rest = select_rows(first, state.tip.linear(), state.jacobian);
       rest.col(i).setZero();
       if (ratio(rest) < 0.15) continue;
@@ -259,7 +258,7 @@ TEST_CASE("exact rows are kept while the others give way, in base and in tool ax
       const ServoStep step = once(shipped.with_limits(limits), JParse{}, options, q, twist);
       const Twist missed = twist - step.achieved_twist;
       ++cases;
-      // They weigh 10³ times as much, so what they miss is 10⁻⁶ of what the others do, times how hard they pull.
+      // The first rows weigh 10³ times as much, so they miss 10⁻⁶ of the motion of the other rows, times their pull.
       const double pull = (twist.norm() + missed.norm()) / ratio(rest);
       CHECK(select_rows(first, state.tip.linear(), missed).norm() <= 1e-5 * pull);
       if (missed.norm() > 1e-3 * twist.norm()) {
@@ -278,7 +277,7 @@ TEST_CASE("exact rows are kept while the others give way, in base and in tool ax
   CHECK(first_lost > 50);
 }
 
-TEST_CASE("scaling keeps the direction, and gets there in proportion, whenever the limits allow") {
+TEST_CASE("scaling keeps the direction, and changes velocities in proportion, whenever the limits allow") {
   long straight = 0, bent = 0;
   for (const auto& [key, shipped] : arms()) {
     const std::string& name = key;
@@ -317,7 +316,7 @@ TEST_CASE("scaling keeps the direction, and gets there in proportion, whenever t
         const double speed = largest(zero, asked, tracker.heading());
         const VectorXd goal = std::max(0.0, speed) * asked;
         VectorXd way = goal - last;
-        for (double& x : way) x = std::abs(x) > 1e-12 ? x : 0.0;  // of rounding
+        for (double& x : way) x = std::abs(x) > 1e-12 ? x : 0.0;  // smaller entries are rounding
         const double part = largest(last, way, tracker.bounds());
         const ServoStep step = servo.update_twist(twist);
         JointVector qdot = step.qdot;
@@ -397,13 +396,13 @@ TEST_CASE("leaving a limit is never held back, from any corner of the limits") {
       const Twist asked = J * rule(chain, JParse{}, q, twist);
       CHECK(step.qdot.norm() > 1e-6);
       CHECK(step.achieved_twist.dot(asked) > 0.0);
-      if (ratio(J) > 0.1) {  // what leads inside is among all that can be chosen
+      if (ratio(J) > 0.1) {  // the way inside is among all velocities that can be chosen
         ++whole;
         CHECK((step.achieved_twist - twist).norm() <= 1e-3 * twist.norm());
       }
       // With all limits, and for two hundred cycles.
       for (const OnLimit on_limit : {OnLimit::Redistribute, OnLimit::Scale}) {
-        if (on_limit == OnLimit::Scale && (n != 6 || ratio(J) < 0.1)) continue;  // their rule itself leads inside
+        if (on_limit == OnLimit::Scale && (n != 6 || ratio(J) < 0.1)) continue;  // else the rule itself leads inside
         ServoOptions options = holding(true, true, true, true);
         options.on_limit = on_limit;
         Servo servo(chain, JParse{}, options);
@@ -436,7 +435,7 @@ TEST_CASE("starts outside the limits, and too fast ones: every arm comes back, a
           }
           if (kind >= 2 && kind < 4) moving[i] = (kind == 2 ? 2.0 : -2.0) * limits.velocity[i];
         }
-        if (kind == 4) start.setZero();  // outside for some
+        if (kind == 4) start.setZero();  // outside for some arms
         if (kind == 5 && !std::isinf(limits.upper[1])) start[1] = limits.upper[1] + 0.5;
         ServoOptions options;
         if (random.chance(0.5)) options.on_limit = OnLimit::Scale;
@@ -446,7 +445,7 @@ TEST_CASE("starts outside the limits, and too fast ones: every arm comes back, a
         JointVector last = moving, last_change = JointVector::Zero(n);
         const double dt = options.dt;
         long broken = 0, late = 0, grew = 0;
-        // There at a tenth of the speed, after the overshoot of the fast ones.
+        // The time to come back at a tenth of the speed, after the overshoot of the fast starts.
         double time = 0.0;
         for (int i = 0; i < n; ++i) {
           const double v = std::abs(moving[i]), a = limits.acceleration[i];
@@ -567,7 +566,7 @@ TEST_CASE("bad input in motion: a stop as fast as the limits allow, and on again
   }
 }
 
-TEST_CASE("no jumps where the joints held change: as commands move, and as the arm does") {
+TEST_CASE("no jumps where the set of held joints changes, as commands move and as the arm moves") {
   // Halves the interval again and again, keeping the half that changes more: a jump stays, a slope vanishes.
   const auto closest = [](const std::function<VectorXd(double)>& f, double a, double b) {
     VectorXd fa = f(a), fb = f(b);
@@ -654,10 +653,10 @@ TEST_CASE("no jumps where the joints held change: as commands move, and as the a
   MESSAGE("state, steps of 1.7 mrad: |Δq̇| / |Δq| ≤ ", by_state, " 1/s, the tool's error ≤ ", tool_by_state,
           " 1/s; a fifth of a joint's speed in ", swings, " of ", steps, " steps");
   CHECK(switches > 1000);
-  CHECK(over_rule < 1e4);  // what the weight of joint motion against twist, 1e-4, allows
+  CHECK(over_rule < 1e4);  // the weight of joint motion against twist, 1e-4, allows this factor
   CHECK(by_command < 1e4);
-  // As the arm moves joints may swing from limit to limit where those left free are singular among themselves; what the
-  // tool misses does not.
+  // As the arm moves, joints may swing from limit to limit where the free joints are singular among themselves; the
+  // tool's error does not swing.
   CHECK(tool_by_state < 100.0);
   CHECK(100 * swings < steps);
 }

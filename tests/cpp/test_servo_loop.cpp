@@ -1,5 +1,5 @@
-// A servo in its own thread: commands from others, stale ones, changes of rule and options under way, what is read
-// back.
+// A servo in its own thread: commands from other threads, stale commands, changes of rule and options during the
+// motion, and the samples that are read.
 
 #include <doctest/doctest.h>
 
@@ -64,7 +64,7 @@ double beyond_acceleration(const std::vector<LoopSample>& samples, double dt) {
 
 TEST_CASE("another servo takes over in the midst of the motion, as if it had always been there") {
   Random random(1);
-  // The same rule and options without a fade: not to be told from one servo, but for the warm start.
+  // With the same rule and options and no fade, two servos act as one servo, except for the warm start.
   for (int trial = 0; trial < 50; ++trial) {
     ServoOptions options{.soft_start = 0.0, .posture_gain = 1.0};
     Servo one = started(options), two = started(options), next(panda(), JParse{}, options);
@@ -191,7 +191,7 @@ TEST_CASE("a pose is followed, at the rate, and every cycle can be read") {
   if (s.unread == 0) CHECK(beyond_acceleration(samples, 1e-3) < 1e-12);
 }
 
-TEST_CASE("a command that is not said again goes stale, and the arm stops within its limits") {
+TEST_CASE("a command that is not repeated goes stale, and the arm stops within its limits") {
   ServoLoop loop(started());
   loop.start();
   loop.follow_twist(Twist{{0.1, 0.0, 0.0, 0.0, 0.0, 0.0}}, 0.1);

@@ -83,7 +83,7 @@ TEST_CASE("every set is singular, on all its branches") {
         const JointVector q = onto(sets, i, anywhere(random, sets.dof()));
         std::array<double, kMaxSets> psi;
         CHECK(sets.psi(q, psi) == sets.size());
-        if (!(psi[static_cast<std::size_t>(i)] < 1e-26)) continue;  // Newton's method went astray
+        if (!(psi[static_cast<std::size_t>(i)] < 1e-26)) continue;  // Newton's method has not converged
         ++found;
         worst = std::max(worst, sigma_ratio(chain, q));
       }
@@ -124,7 +124,7 @@ TEST_CASE("derivatives") {
     const int n = sets.dof();
     CAPTURE(name);
     for (int trial = 0; trial < 2000; ++trial) {
-      // Every other point is near a set, where the potential is.
+      // Every other point is near a set, where the potential is high.
       JointVector q = anywhere(random, n);
       if (trial % 2) q = onto(sets, trial / 2 % sets.size(), q) + 0.03 * random.vector(n);
       const auto check = [&](const JointVector& got, const JointVector& expected, double scale) {
@@ -281,7 +281,7 @@ TEST_CASE("recorded expressions give the same numbers") {
       REQUIRE(static_cast<int>(got.size()) == count);
       for (int i = 0; i < count; ++i)
         CHECK(std::abs(got[static_cast<std::size_t>(i)] - r[static_cast<std::size_t>(i)]) < 1e-15);
-      // Many turns away, and so many that the library's sine takes over.
+      // Many turns away, and so many turns that the library's sine takes over.
       JointVector far = q;
       for (int i = 0; i < far.size(); ++i) far[i] += random.uniform(-1.0, 1.0) * (trial % 2 ? 9e4 : 1e9);
       sets.residuals(far, r);

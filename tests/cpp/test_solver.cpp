@@ -1,9 +1,8 @@
-// VelocitySolver: what it says of its answers, posture, units, symmetries, bad input; and that it leaves the heap
+// VelocitySolver: its reports on its answers, posture, units, symmetries, bad input; and the solver leaves the heap
 // alone.
 
 #include <doctest/doctest.h>
 
-#include <limits>
 #include <memory>
 #include <utility>
 
@@ -13,26 +12,26 @@
 
 #include "heap.hpp"
 #include "methods.hpp"
+#include "numbers.hpp"
 #include "random.hpp"
 
 namespace {
 
 using namespace sigmaik;
 using test::all_methods;
+using test::kInfinity;
+using test::kNan;
 using test::MatrixXd;
 using test::Random;
 using test::VectorXd;
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-
-// Gain of a method that need not be smooth: how far apart two answers may be that should be the same.
+// Gain of a method that need not be smooth: bound on the difference of two answers that should be the same.
 double gain(const Method& method, const Solution& s) {
   const double largest = s.singular_values.size() > 0 ? std::max(s.singular_values[0], 1e-300) : 1.0;
   return std::holds_alternative<PseudoInverse>(method) ? 1e3 / largest : 30.0 / largest;
 }
 
-VectorXd well_separated(Random& random, int k) {  // and apart from the thresholds of 0.1 and 0.2
+VectorXd well_separated(Random& random, int k) {  // apart from each other and from the thresholds of 0.1 and 0.2
   VectorXd sigma(k);
   sigma[0] = 1.0;
   for (int i = 1; i < k; ++i) {
@@ -70,9 +69,9 @@ TEST_CASE("achieved twist and status tell the truth") {
       CHECK(s.directions.rows() == m);
       CHECK(s.directions.cols() == m);
       const double missed = (s.achieved_twist - twist).norm();
-      // A posture may be moved by rounding, in proportion to what it would do by itself.
+      // Rounding may move a posture, in proportion to the tip's motion by the posture alone.
       const double rest = posture.size() != 0 ? 3e-9 * s.singular_values[0] * posture.norm() : 0.0;
-      // What must be undone in large joint speeds comes back with their rounding.
+      // Motion that cancels in large joint speeds comes back with the rounding of these speeds.
       const double rounding = 1e-14 * s.singular_values[0] * s.qdot.norm();
       if (s.status == Status::Ok) {
         CHECK(missed <= 3e-9 * twist.norm() + rest + rounding);
@@ -147,7 +146,7 @@ TEST_CASE("the base's axes, the tip's axes and the joints' signs do not matter")
     for (const Method& method : all_methods()) {
       CAPTURE(repeat);
       CAPTURE(name(method));
-      // A length scale of 1, as otherwise singular values are not those that were made.
+      // The length scale is 1; otherwise the singular values would not be those that were made.
       VelocitySolver a(method), b(method), c(method);
       const Solution s = a.solve(j, twist, posture);
       const double tolerance = 1e-11 * gain(method, s) * (twist.norm() + posture.norm());
@@ -184,7 +183,7 @@ TEST_CASE("the same arm in other units, or of another size, moves the same") {
       if (auto* dls = std::get_if<DampedLeastSquares>(&scaled)) dls->damping *= unit;  // λ is in the units of σ
       VelocitySolver a(method, length_scale), b(scaled, length_scale * unit);
       const Solution s = a.solve(j, twist), t = b.solve(other, command);
-      // Close to a threshold rounding may choose the side.
+      // Close to a threshold, rounding may decide on the side.
       bool on_edge = false;
       for (int i = 0; i < s.singular_values.size(); ++i) {
         for (const double gamma : {0.1, 0.2}) {
@@ -422,7 +421,7 @@ TEST_CASE("along the error, J-PARSE with equal gains never moves away from the t
 }
 
 #ifdef SIGMAIK_TEST_HEAP
-TEST_CASE("the watch on the heap sees what it should") {
+TEST_CASE("the watch on the heap counts every call") {
   const auto seen = [](auto work) {
     const test::HeapWatch watch;
     work();
@@ -439,7 +438,7 @@ TEST_CASE("the watch on the heap sees what it should") {
           CHECK(x.sum() == 7.0);
         }) >= 2);
   volatile std::size_t size = 64;
-  void* volatile kept = nullptr;  // or a compiler leaves out what nobody uses
+  void* volatile kept = nullptr;  // keeps a compiler from leaving out memory that nobody uses
   const auto free_again = [&](void* block) {
     kept = block;
     std::free(kept);

@@ -1,4 +1,5 @@
-// The singular value decomposition: against one in long double, for every size; its warm start; its continuity.
+// The singular value decomposition, for every size, against a decomposition in long double; its warm start and
+// continuity.
 
 #include <doctest/doctest.h>
 
@@ -38,7 +39,7 @@ double off_orthonormal(const MatrixXd& basis) {
   return (basis.transpose() * basis - MatrixXd::Identity(basis.cols(), basis.cols())).cwiseAbs().maxCoeff();
 }
 
-// What is true of every decomposition. Errors are measured against σ_max.
+// Checks that hold for every decomposition. Errors are measured against σ_max.
 void check_decomposition(const Spectrum& s, const MatrixXd& j) {
   REQUIRE(s.rows() == j.rows());
   REQUIRE(s.cols() == j.cols());
@@ -173,7 +174,7 @@ TEST_CASE("small singular values are found to full relative accuracy where the r
   }
 }
 
-TEST_CASE("a warm start gives what a cold one gives, and keeps signs") {
+TEST_CASE("a warm start gives the result of a cold one, and keeps signs") {
   Random random(4);
   for (int repeat = 0; repeat < 100; ++repeat) {
     const int m = random.integer(1, 6), n = random.integer(1, 16), k = std::min(m, n);
@@ -193,7 +194,7 @@ TEST_CASE("a warm start gives what a cold one gives, and keeps signs") {
       const VectorXd values = sigma(warm);
       CHECK((values - sigma(cold)).cwiseAbs().maxCoeff() < 64.0 * kEpsilon * values[0]);
       for (int i = 0; i < k; ++i) {
-        double gap = values[i];  // to the others and to zero, of which every one blurs the direction
+        double gap = values[i];  // to the other values and to zero, each of which blurs the direction
         for (int l = 0; l < k; ++l) {
           if (l != i) gap = std::min(gap, std::abs(values[i] - values[l]));
         }
@@ -215,7 +216,7 @@ TEST_CASE("a warm start gives what a cold one gives, and keeps signs") {
   }
 }
 
-TEST_CASE("a small part that changes wholly while the large part stands still") {
+TEST_CASE("a small part may change completely while the large part stands still") {
   Random random(12);
   for (int repeat = 0; repeat < 200; ++repeat) {
     const int m = random.integer(4, 6), n = random.integer(m, 12), large = random.integer(1, m - 3);
@@ -279,7 +280,7 @@ TEST_CASE("a Jacobian that stands still leaves the decomposition still") {
     for (int step = 0; step < 1000; ++step) s.decompose(j);
     CAPTURE(repeat);
     check_decomposition(s, j);
-    // Where a singular value is at the edge of rounding its direction is noise: only the rest must stand still.
+    // Where a singular value is at the edge of rounding, its direction is noise: only the others must stand still.
     for (int i = 0; i < s.size(); ++i) {
       if (s.sigma(i) < 1e-6 * s.sigma(0)) continue;
       CHECK((s.u(i) - first_u.col(i)).norm() < 1e-9);

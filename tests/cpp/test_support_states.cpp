@@ -23,7 +23,7 @@ JointVector inside(Random& random, const Chain& chain) {
   return q;
 }
 
-// ½ |q − c|²: with it the optimum is a linear system.
+// ½ |q − c|²: with this cost the optimum is a linear system.
 class Bowl final : public JointCost {
  public:
   explicit Bowl(JointVector center) : center_(std::move(center)) {}
@@ -59,7 +59,7 @@ class Throws final : public BatchCost {
 TEST_CASE("a quadratic cost has the optimum of its linear system") {
   // Σ ½ (q_i − c)² + w (q − μ)ᵀ K̄⁻¹ (q − μ): (I + 2 w K̄⁻¹)(q − μ) = c − μ, joint by joint.
   Random random(1);
-  JointLimits limits = test::arms().at("franka_panda").limits();  // none, for the system knows of none
+  JointLimits limits = test::arms().at("franka_panda").limits();  // none, because the linear system has no limits
   limits.lower.setConstant(-std::numeric_limits<double>::infinity());
   limits.upper.setConstant(std::numeric_limits<double>::infinity());
   const Chain chain = test::arms().at("franka_panda").with_limits(limits);
@@ -92,7 +92,7 @@ TEST_CASE("a quadratic cost has the optimum of its linear system") {
   }
 }
 
-TEST_CASE("samples find it too, and the same for the same seed") {
+TEST_CASE("samples find the optimum too, and the same seed gives the same motion") {
   Random random(2);
   const Chain& chain = test::arms().at("ur10");
   const JointVector start = inside(random, chain), goal = inside(random, chain);
@@ -129,7 +129,7 @@ TEST_CASE("states stay within the limits") {
   }
 }
 
-TEST_CASE("what a cost throws comes through, and the planner goes on") {
+TEST_CASE("an exception of a cost reaches the caller, and the planner works afterwards") {
   const Chain& chain = test::arms().at("ur10");
   Random random(4);
   const JointVector start = inside(random, chain), goal = inside(random, chain);

@@ -1,4 +1,4 @@
-// Streams of samples: exact where the target moves as the model says, and continuous whatever comes.
+// Streams of samples: exact where the target moves as the model says, and continuous for any samples.
 
 #include <doctest/doctest.h>
 
@@ -12,6 +12,7 @@
 #include <sigmaik/target_stream.hpp>
 
 #include "heap.hpp"
+#include "numbers.hpp"
 #include "random.hpp"
 
 namespace {
@@ -19,12 +20,12 @@ namespace {
 using namespace sigmaik;
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
+using test::kNan;
 using test::Random;
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr StreamMode kModes[] = {StreamMode::Hold, StreamMode::Interpolate, StreamMode::Predict};
 
-// From `start`, at a constant twist.
+// The pose that a constant twist reaches from `start`.
 Pose screw(const Pose& start, const Twist& twist, double seconds) {
   Pose out;
   out.translation() = start.translation() + seconds * twist.head<3>();
@@ -99,7 +100,7 @@ TEST_CASE("predict: a constant twist is met exactly, whatever the delay") {
   }
 }
 
-TEST_CASE("predict: a Kalman filter of six states finds the same") {
+TEST_CASE("predict: a Kalman filter of six states gives the same targets") {
   Random random(2);
   for (int repeat = 0; repeat < 50; ++repeat) {
     TargetStreamOptions options;
@@ -155,12 +156,12 @@ TEST_CASE("interpolate: through every sample, latency later, and smooth in betwe
     double next = 0.0;
     for (int cycle = 0; cycle <= 2500; ++cycle) {
       const double now = 1e-3 * cycle;
-      for (; next + 0.02 <= now; next += 1e-3 * random.integer(5, 50)) {  // two samples ahead of what is played
+      for (; next + 0.02 <= now; next += 1e-3 * random.integer(5, 50)) {  // two samples ahead of the played time
         stamps.push_back(next);
         REQUIRE(stream.push(next, wander.pose(next)) == SampleStatus::Accepted);
       }
       const Target target = stream.at(now);
-      if (cycle < 1500) continue;  // the start is far from R(t), and needs 30 τ to be forgotten
+      if (cycle < 1500) continue;  // the start is far from R(t), and this takes 30 τ to decay
       const double play = now - options.latency;
       CHECK(distance(target.pose, wander.pose(play)) < 5e-3);
       CHECK((target.twist - wander.twist(play)).norm() < 0.25);
@@ -218,7 +219,7 @@ TEST_CASE("hold: goes to the last sample, and rests there without overshoot") {
   }
 }
 
-TEST_CASE("whatever comes: pose and twist are continuous, and never faster than the limits") {
+TEST_CASE("for any samples pose and twist are continuous, and never faster than the limits") {
   long refused = 0, relocated = 0, coasted = 0, stale = 0;
   for (unsigned seed = 0; seed < 3000; ++seed) {
     Random random(seed);
@@ -235,7 +236,7 @@ TEST_CASE("whatever comes: pose and twist are continuous, and never faster than 
     const Wander wander(random);
     Pose off = Pose::Identity();
     const double period = random.uniform(0.004, 0.06), delay = random.uniform(0.0, 0.1);
-    // Late stamps are whole periods late: the cubic between two samples turns as fast as they are close.
+    // Late stamps are late by whole periods: the cubic between two samples turns faster the closer the samples are.
     const double dropout = random.uniform(0.0, 0.5), outliers = random.uniform(0.0, 0.2);
     double next = 0.0, gap_until = 0.0, now = random.uniform(-1e3, 1e9);
     const double zero = now;
@@ -268,7 +269,7 @@ TEST_CASE("whatever comes: pose and twist are continuous, and never faster than 
       if (!first) {
         CHECK(step.head<3>().norm() <= options.max_speed * elapsed + 1e-12);
         CHECK(step.tail<3>().norm() <= options.max_angular_speed * elapsed + 1e-12);
-        // Of d, of fading to rest, of the cubic between samples, and of d turning with ω.
+        // Accelerations of d, of fading to rest, of the cubic between samples, and of d turning with ω.
         const double fade = 1.5 / (options.timeout - options.horizon);
         const double cubic = options.mode == StreamMode::Interpolate ? 20.0 / period : 0.0;
         const double a = elapsed * (1.0 / options.smoothing + fade + cubic + 4.0 * options.max_angular_speed) + 1e-6;
@@ -285,7 +286,7 @@ TEST_CASE("whatever comes: pose and twist are continuous, and never faster than 
     refused += stream.counts().outliers + stream.counts().out_of_order + stream.counts().invalid;
     relocated += stream.counts().relocated;
   }
-  CHECK(refused > 10000);  // it was as bad as it should be
+  CHECK(refused > 10000);  // the input was as bad as intended
   CHECK(relocated > 100);
   CHECK(coasted > 1000);
   CHECK(stale > 1000);
@@ -317,13 +318,13 @@ TEST_CASE("a stream that stops: coasts for the horizon, and rests from the timeo
     CHECK(target.twist.norm() < 1e-9);
     const double moved = mode == StreamMode::Hold ? 0.0 : 0.5 * (options.horizon + options.timeout);
     CHECK(distance(target.pose, screw(start, twist, last + moved)) < 1e-6);
-    // And on again: from where it stands.
+    // The stream starts again, from where the target stands.
     CHECK(stream.push(now, start) == SampleStatus::Accepted);
     CHECK(distance(stream.at(now).pose, target.pose) < 2e-3);
   }
 }
 
-TEST_CASE("outliers leave no trace; a run of them that agree is believed") {
+TEST_CASE("outliers leave no trace; a run of outliers that agree is accepted") {
   Random random(7);
   for (const StreamMode mode : kModes) {
     TargetStreamOptions options;
@@ -377,7 +378,7 @@ TEST_CASE("stamps: doubled and late ones are refused, a clock that was set back 
   CHECK(stream.counts().accepted == 5);
 }
 
-TEST_CASE("what is no sample, and what is no time") {
+TEST_CASE("invalid samples and times are refused") {
   TargetStream stream;
   Random random(8);
   CHECK(stream.at(0.0).status == StreamStatus::Waiting);

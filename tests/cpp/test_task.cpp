@@ -1,4 +1,4 @@
-// Task masks and frames: which rows are asked for, and that a solver with a task does what masking by hand does.
+// Task masks and frames: the rows asked for; a solver with a task gives the same answer as masking by hand.
 
 #include <doctest/doctest.h>
 
@@ -24,7 +24,7 @@ Task task_of(unsigned bits, Frame frame) {
   return task;
 }
 
-// The rows asked for, by a matrix product.
+// The rows asked for, selected by a matrix product.
 MatrixXd selector(const Task& task, const Eigen::Matrix3d& rotation) {
   MatrixXd turn = MatrixXd::Identity(6, 6);
   if (task.frame == Frame::Tool) {
@@ -107,7 +107,7 @@ TEST_CASE("a solver with a task: as masked by hand, and as given masked already"
     }
     sigmaik::Spectrum spectrum;
     spectrum.decompose(masked);
-    // A singular value that sits on the threshold is on either side of it, and its direction may then be any.
+    // A singular value on the threshold may be on either side of it, and its direction may then be any.
     bool on_edge = false;
     for (int i = 0; i < spectrum.size(); ++i) {
       const double ratio = spectrum.sigma(i) / spectrum.sigma(0);
@@ -119,7 +119,7 @@ TEST_CASE("a solver with a task: as masked by hand, and as given masked already"
                          (method.gamma * spectrum.sigma(0));
 
     if (masked.rows() < 6) {
-      // Given as masked already, unweighted.
+      // The Jacobian is given as masked already, unweighted.
       MatrixXd given = rows * j;
       VectorXd asked = rows * twist;
       sigmaik::VelocitySolver same(method, length_scale, task);
@@ -149,7 +149,7 @@ TEST_CASE("rows that are not asked for are free: their command does not matter, 
     CHECK((a.qdot - b.qdot).norm() < 1e-12 * (1.0 + a.qdot.norm()));
     CHECK(a.status == sigmaik::Status::Ok);
     CHECK((j.topRows(3) * a.qdot - twist.head(3)).norm() < 1e-12);
-    // The least motion of all that do it.
+    // The least of all motions with this twist.
     CHECK(a.qdot.norm() <= test::least_squares(j, j * a.qdot).norm() * (1.0 + 1e-9));
   }
 }

@@ -118,9 +118,9 @@ double objective(const TimeOptimalResult& r, int n, const TimeOptimalOptions& op
 }
 
 // Stationarity, without the method's own linear algebra: over all motions that keep dynamics and ends, and that stay
-// off the limits which this one touches, the objective's gradient vanishes but for what pushes into these limits. The
-// motions are parametrised by (h, q̈_0 … q̈_{N-2}); limits and ends give one row each; multipliers by non-negative least
-// squares.
+// off the limits which this motion touches, the objective's gradient vanishes except for the part that pushes into
+// these limits. The motions are parametrised by (h, q̈_0 … q̈_{N-2}); limits and ends give one row each; non-negative
+// least squares gives the multipliers.
 struct Kkt {
   double residual;  // of the gradient, relative to its largest entry
 };
@@ -160,7 +160,8 @@ Kkt stationarity(const Chain& chain, const TimeOptimalResult& r, const TimeOptim
         if (l.velocity[i] + v < tolerance) one_sided.push_back(dv);
         if (l.velocity[i] - v < tolerance) one_sided.push_back(-dv);
       }
-      // The point between: of the first step it moves with h alone, of the last one the other way.
+      // The point between the nodes: in the first step only h moves this point, in the last step the same holds from
+      // the end.
       const double end_velocity = at(r.qdot, nodes - 1, i);
       Eigen::VectorXd between = dq + 0.5 * h * dv;
       between[0] += 0.5 * v;
@@ -182,7 +183,7 @@ Kkt stationarity(const Chain& chain, const TimeOptimalResult& r, const TimeOptim
       }
     }
   }
-  // Least squares in all multipliers first; those of limits that come out clearly negative would be a failure.
+  // Least squares in all multipliers first; a clearly negative multiplier of a limit would be a failure.
   Eigen::MatrixXd rows(size, static_cast<Eigen::Index>(free_rows.size() + one_sided.size()));
   for (std::size_t j = 0; j < free_rows.size(); ++j) rows.col(static_cast<Eigen::Index>(j)) = free_rows[j];
   for (std::size_t j = 0; j < one_sided.size(); ++j) {
@@ -190,7 +191,7 @@ Kkt stationarity(const Chain& chain, const TimeOptimalResult& r, const TimeOptim
   }
   const Eigen::VectorXd multipliers = test::least_squares(rows, gradient);
   double residual = (gradient - rows * multipliers).cwiseAbs().maxCoeff() / gradient.cwiseAbs().maxCoeff();
-  // A dependent set of active rows leaves signs open: then only the residual counts.
+  // If the set of active rows is dependent, the signs are not determined: then only the residual counts.
   if (rows.cols() == test::rank(rows)) {
     for (std::size_t j = 0; j < one_sided.size(); ++j) {
       const double z = multipliers[static_cast<Eigen::Index>(free_rows.size() + j)];
@@ -227,7 +228,7 @@ TEST_CASE("without limits and costs the optimum has a closed form") {
   }
 }
 
-TEST_CASE("constraints hold, the objective is what is said, and the motion is stationary") {
+TEST_CASE("constraints hold, the objective is the stated one, and the motion is stationary") {
   Random random(2);
   int optimal = 0, moving = 0;
   for (const auto& [key, arm] : test::arms()) {
@@ -296,7 +297,7 @@ TEST_CASE("ends that move") {
     CHECK(stationarity(chain, r, options, nullptr).residual < 1e-3);
   }
   MESSAGE(solved << " of " << cases);
-  CHECK(solved >= cases * 95 / 100);  // 0.7 rad of room stop 1.2 rad/s at 6 rad/s²; a grid may still be too coarse
+  CHECK(solved >= cases * 95 / 100);  // 0.7 rad is room to stop 1.2 rad/s at 6 rad/s²; a grid may still be too coarse
 }
 
 TEST_CASE("starts and goals on a limit, and no way to go at all") {
@@ -311,7 +312,7 @@ TEST_CASE("starts and goals on a limit, and no way to go at all") {
   CHECK(violation(chain, problem, r) < 1e-9);
   CHECK(r.duration == doctest::Approx(2.3).epsilon(0.1));
 
-  problem.goal = problem.start;  // nowhere to go, from the limits
+  problem.goal = problem.start;  // the motion stands still, on the limits
   r = planner.solve(problem);
   CHECK(r.status != PlanStatus::Failed);
   CHECK(violation(chain, problem, r) < 1e-9);

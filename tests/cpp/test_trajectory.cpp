@@ -43,7 +43,7 @@ Chain arm(const std::string& name) {
   return chain.with_limits(limits);
 }
 
-// Between these two a smooth cubic, of which position, velocity and acceleration are known anywhere.
+// A smooth cubic between these two positions, whose position, velocity and acceleration are known anywhere.
 Trajectory cubic(double from, double to, double duration, int samples) {
   Trajectory out;
   out.dof = 1;
@@ -181,7 +181,7 @@ TEST_CASE("clearance finds the walls that a path has to cross, and those that it
   CHECK(there_and_back.min_manipulability() ==
         *std::min_element(there_and_back.manipulability.begin(), there_and_back.manipulability.end()));
 
-  // Of an arm whose sets are not known, the manipulability alone.
+  // An arm whose sets are not known has the manipulability alone.
   const Chain& plain = test::arms().at("ufactory_xarm7");
   const Clearance bare = clearance(plain, SingularSets::of(plain), {0.0}, std::vector<double>(7, 0.3));
   CHECK(bare.names.empty());
@@ -192,7 +192,7 @@ TEST_CASE("clearance finds the walls that a path has to cross, and those that it
   CHECK_THROWS_AS(clearance(chain, sets, {0.0, 1.0}, std::vector<double>(7, 0.0)), Error);
 }
 
-TEST_CASE("a plan through what it should avoid is looked for from the other side") {
+TEST_CASE("a plan with an avoidable crossing is tried from the other side") {
   Random random(11);
   int entered = 0, better = 0;
   for (const char* name : {"kuka_lbr_iiwa_14_r820", "franka_panda", "comau_racer_7_1_4"}) {
@@ -257,7 +257,7 @@ TEST_CASE("a smooth motion keeps the limits between its states, in the shortest 
 }
 
 TEST_CASE("a motion round an obstacle touches nothing, by restarts where it must") {
-  // A ball about where the straight line leads the tip, with margins at both ends.
+  // A ball at the place to which the straight line leads the tip, with margins at both ends.
   Random random(2);
   const Chain chain = arm("kuka_lbr_iiwa_14_r820");
   const ArmSpheres spheres = ArmSpheres::along_links(chain);
@@ -306,7 +306,7 @@ TEST_CASE("a motion round an obstacle touches nothing, by restarts where it must
   CHECK_THROWS_WITH_AS(stuck.plan(q, q, GradientOptions{}), doctest::Contains("the start is in collision"), Error);
 }
 
-TEST_CASE("samples, refined, are no worse") {
+TEST_CASE("the samples' motion is no worse after refinement") {
   Random random(9);
   const Chain chain = arm("franka_panda");
   SupportPlanner planner(chain, log_manipulability_cost(chain), 21);

@@ -1,4 +1,4 @@
-// Reading URDF: what comes out, and that whatever is not a usable serial arm is refused with the facts.
+// Reading URDF: the chain that results; every file that is not a usable serial arm is refused with the facts.
 
 #include <doctest/doctest.h>
 
@@ -9,7 +9,6 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
-#include <limits>
 #include <locale>
 #include <random>
 #include <thread>
@@ -20,12 +19,13 @@
 #include <sigmaik/error.hpp>
 #include <sigmaik/kinematics.hpp>
 
+#include "numbers.hpp"
+
 namespace {
 
 using sigmaik::Chain;
 using sigmaik::JointType;
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+using test::kInfinity;
 
 // ---- Writing URDF --------------------------------------------------------------------------------------------------
 
@@ -115,7 +115,7 @@ TEST_CASE("files that cannot be opened") {
   check_facts(refusal(file.path), {file.path, "cannot be opened", "Permission denied"});
 }
 
-TEST_CASE("what is not XML, or not URDF") {
+TEST_CASE("texts that are not XML, or not URDF") {
   check_facts(refusal("<robot name='r'"), {"URDF text", "malformed XML", "line 1"});
   check_facts(refusal("<robot>\n<link>\n</robot>"), {"malformed XML", "line 2", "MISMATCHED_ELEMENT"});
   check_facts(refusal("<!-- nothing -->"), {"there is no element"});
@@ -171,7 +171,7 @@ TEST_CASE("names") {
 }
 
 TEST_CASE("bytes that are not UTF-8") {
-  // Comments may be; names may not, and a message that quotes them stays UTF-8, as Python needs it.
+  // Comments may have such bytes; names may not, and a message that quotes them stays UTF-8, as Python needs it.
   CHECK(Chain::from_urdf("<!-- Andr\xE9 -->" + arm(kLimit)).dof() == 2);
   for (const std::string bad :
        {"\xE9", "\xC3", "\xC0\x80", "\xE0\x80\x80", "\xED\xA0\x80", "\xF4\x90\x80\x80", "\x80"}) {
@@ -186,7 +186,7 @@ TEST_CASE("bytes that are not UTF-8") {
   check_facts(refusal(text), {"€€…'"});
 }
 
-TEST_CASE("what is not a tree") {
+TEST_CASE("links and joints that are not a tree") {
   check_facts(refusal(sprout(link("b"))), {"not one tree", "'base', 'b'"});
   check_facts(refusal(sprout(joint("j3", "fixed", "tip", "base", ""))), {"no root", "loop"});
   check_facts(refusal(sprout(joint("j3", "fixed", "base", "tip", ""))), {"'tip'", "two joints, 'j2' and 'j3'"});
@@ -221,7 +221,7 @@ TEST_CASE("base and tip") {
   CHECK(chain.tip() == "tip");
   CHECK(chain.dof() == 1);
 
-  // A long list is cut.
+  // A long list is cut off.
   std::string many;
   for (int i = 0; i < 200; ++i) {
     const std::string name = "leaf" + std::to_string(i);
@@ -250,7 +250,7 @@ TEST_CASE("joints that an arm cannot have") {
   CHECK(Chain::from_urdf(robot(long_arm), "", "l16").dof() == 16);
 }
 
-TEST_CASE("what is beside the arm does not matter") {
+TEST_CASE("elements beside the arm do not matter") {
   const std::string beside =
       link("x", "<visual><geometry><teapot/></geometry><material name='nowhere'/></visual><inertial/>") +
       joint("jx", "floating", "a", "x", "") + link("y") + joint("jy", "revolute", "a", "y", "<mimic joint='j1'/>") +
@@ -409,7 +409,7 @@ TEST_CASE("inertias") {
   CHECK((inertia.tensor - turned).cwiseAbs().maxCoeff() < 1e-15);
 }
 
-// ---- What comes out ------------------------------------------------------------------------------------------------
+// ---- Results -------------------------------------------------------------------------------------------------------
 
 TEST_CASE("every kind of joint and limit") {
   const Chain chain = Chain::from_urdf(robot(

@@ -14,7 +14,6 @@
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
-#include <limits>
 #include <map>
 #include <mutex>
 #include <optional>
@@ -27,15 +26,16 @@
 #include <sigmaik/pose.hpp>
 #include <sigmaik/servo.hpp>
 
+#include "numbers.hpp"
 #include "random.hpp"
 
 namespace {
 
 using namespace sigmaik;
+using test::kInfinity;
+using test::kNan;
 using test::Random;
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kTolerance = 1e-9;  // relative, of velocity, acceleration and jerk limits; positions get none
 constexpr double kDone = 1e-4;       // the servo's: a twist that misses this part of itself is done
 constexpr double kSnap = 2e-12;      // q + q̇ dt to this, times 1 + |q|
@@ -69,7 +69,7 @@ struct Counts {
   std::array<long, 5> servo_status{}, constrained_status{};
   std::array<long, kFailures> failures{};
   std::array<double, 4> worst{};  // largest of value / (limit + rounding), position: [rad or m] beyond the limit
-  double longest_recovery = 0.0;  // of the time allowed
+  double longest_recovery = 0.0;  // as a part of the time allowed
   std::array<std::uint32_t, 4> worst_episode{};
   std::vector<std::uint32_t> failed;
 
@@ -104,15 +104,15 @@ struct Limits {
   double lower, upper, velocity, acceleration, jerk, recovery;  // recovery: [1/s or m/s] least speed back
 };
 
-// From v to rest with slope 0 at both ends, in continuous time.
+// Time from v to rest with slope 0 at both ends, in continuous time.
 double stopping_time(const Limits& l, double v) {
   if (std::isinf(l.jerk)) return v / l.acceleration;
   if (std::isinf(l.acceleration) || v < l.acceleration * l.acceleration / l.jerk) return 2.0 * std::sqrt(v / l.jerk);
   return v / l.acceleration + l.acceleration / l.jerk;
 }
 
-// Surely all limits can be kept from here, with a tenth of the way to spare: towards a limit a slope that grows is let
-// go to 0 first; one that falls only helps.
+// Whether all limits can surely be kept from here, with a tenth of the way to spare: a slope that grows towards a limit
+// is first reduced to 0; a slope that falls only helps.
 bool can_be_kept(const Limits& l, double dt, double q, double v, double a) {
   if (q > l.upper || q < l.lower || std::abs(v) > l.velocity) return false;
   for (const double sign : {1.0, -1.0}) {
@@ -127,7 +127,7 @@ bool can_be_kept(const Limits& l, double dt, double q, double v, double a) {
   return true;
 }
 
-// Stop, turn round, travel and settle, a few times over.
+// Time to stop, turn round, travel and settle, a few times over.
 double recovery_time(const Limits& l, double dt, double q, double v) {
   const double speed = std::abs(v), a = l.acceleration, j = l.jerk;
   const bool both = !std::isinf(a) && !std::isinf(j);
@@ -168,7 +168,7 @@ class Joint {
     };
     check(kAcceleration, a, l_.acceleration, rounding);
     check(kJerk, (a - a_) / dt_, l_.jerk, 2.0 * rounding / dt_);
-    // The same of positions, which is all that some controllers are sent.
+    // The same differences from positions, because some controllers receive positions alone.
     const double e = kSnap * (1.0 + farthest_);
     const double d1 = (q - q_) / dt_, d2 = (q - 2.0 * q_ + q_before_) / (dt_ * dt_);
     const double d3 = (q - 3.0 * q_ + 3.0 * q_before_ - q_before_that_) / (dt_ * dt_ * dt_);
@@ -198,7 +198,7 @@ class Joint {
  private:
   Limits l_;
   double dt_, q_, v_, a_ = 0.0, fastest_, farthest_, q_before_, q_before_that_;
-  bool feasible_, armed_, late_ = false;  // late: only the deadline has armed it
+  bool feasible_, armed_, late_ = false;  // late: only the deadline has armed the check
   double deadline_, recovered_ = -1.0;
 };
 
@@ -216,7 +216,7 @@ const std::vector<std::pair<std::string, Chain>>& shipped() {
   return all;
 }
 
-// Over many decades, ratios that make no sense included.
+// Limits over many decades, ratios that make no sense included.
 JointLimits random_limits(Random& random, const Chain& chain, double dt) {
   JointLimits limits = chain.limits();
   const bool jerk = random.chance(0.5);
@@ -267,7 +267,7 @@ struct Command {
   bool bad = false;
 };
 
-// What people, cameras, policies and broken cables ask for.
+// Commands as people, cameras, policies and broken cables give them.
 class Commander {
  public:
   Commander(Random& random, const Chain& chain, const JointVector& q, bool poses_only)
@@ -306,12 +306,12 @@ class Commander {
         command_.pose.translation() += 1e-3 * size_ * random_.unit(3);
         command_.pose.linear() = rotation_exp(Eigen::Vector3d(1e-3 * size_ * random_.unit(3))) * command_.pose.linear();
         break;
-      case 4:  // noise around where it is
+      case 4:  // noise around the tip's pose
         command_.pose = tip;
         command_.pose.translation() += 1e-3 * size_ * random_.vector(3);
         command_.pose.linear() = rotation_exp(Eigen::Vector3d(1e-2 * size_ * random_.vector(3))) * tip.linear();
         break;
-      case 5:  // on and on
+      case 5:  // the same command all the time
         break;
       case 6:  // bang-bang
         if (change) command_.twist = -command_.twist;
@@ -319,10 +319,10 @@ class Commander {
       case 7:
         if (change) command_.twist = random_.decades(-3.0, 2.0) * random_.unit(6);
         break;
-      case 8:  // beyond all measure
+      case 8:  // twists of any size
         if (change) command_.twist = random_.decades(0.0, random_.chance(0.1) ? 250.0 : 12.0) * random_.unit(6);
         break;
-      case 9:  // lets go, and pushes on
+      case 9:  // zero and other twists in turns
         if (change) command_.twist = command_.twist.isZero(0.0) ? Twist(size_ * random_.unit(6)) : Twist(Twist::Zero());
         break;
       default:  // poses and twists in turns
@@ -358,10 +358,10 @@ class Commander {
 
 // ---- An episode -----------------------------------------------------------------------------------------------------
 
-// What an episode is about.
+// The properties of an episode, all drawn at random.
 struct Setup {
   double dt;
-  bool constrained;  // ConstrainedIk, or Servo
+  bool constrained;  // ConstrainedIk, else Servo
   std::string name;
   Chain chain;
   std::array<bool, 4> holds;  // limits of position, velocity, acceleration, jerk
@@ -369,7 +369,7 @@ struct Setup {
   std::vector<Joint> joints;
   JointVector start, moving;
   bool at_once;              // the start is at rest: no command is faded in
-  bool position_only_start;  // reset() is told positions alone
+  bool position_only_start;  // reset() gets positions alone
 };
 
 class Episode {
@@ -381,7 +381,7 @@ class Episode {
     return static_cast<long>(random.decades(2.0, 3.7));
   }
 
-  // An episode is what its number says: the order in which numbers are drawn is part of this test.
+  // The number determines the episode: the order in which numbers are drawn is part of this test.
   Counts run() {
     Setup setup = draw();
     if (talk_) describe(setup);
@@ -449,7 +449,7 @@ class Episode {
                           holds[3] ? c.jerk[i] : kInfinity,
                           std::isinf(c.velocity[i]) ? 0.01 : setup.recovery_speed * c.velocity[i]};
       auto [q, v] = draw_joint(kind, limits);
-      // What takes longer than the episode would tell nothing; zero is a pose that people do start at.
+      // A recovery that takes longer than the episode would show nothing; zero is a pose at which people do start.
       if (recovery_time(limits, setup.dt, q, v) / setup.dt > 0.9 * static_cast<double>(length_) &&
           !can_be_kept(limits, setup.dt, q, v, 0.0)) {
         v = 0.0;
@@ -604,7 +604,7 @@ class Episode {
       if (changes_method && random_.chance(0.01)) servo.set_method(random_method(random_));
       const Command& command = commander.next(servo.tip());
       const bool twist = command.kind == Command::kTwist;
-      // Without limits a huge twist takes a joint beyond what can be calculated with.
+      // Without limits a huge twist takes a joint beyond the range of sensible numbers.
       const bool sane = servo.q().cwiseAbs().maxCoeff() < 1e100;
       const bool look = cycle % 32 == 0 && sane;
       if (look) update(setup.chain, servo.q(), state);

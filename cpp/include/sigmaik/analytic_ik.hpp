@@ -14,7 +14,7 @@ namespace sigmaik {
 /// Postures of a six-joint arm [rad].
 using SixJoints = Eigen::Matrix<double, 6, 1, kLayout>;
 
-/// What AnalyticIk found.
+/// Result of AnalyticIk.
 enum class AnalyticStatus : std::int8_t {
   Ok = 0,           ///< at least one posture
   Unreachable = 1,  ///< the pose is out of reach, by position or (where the wrist is not perpendicular) by orientation
@@ -24,7 +24,7 @@ enum class AnalyticStatus : std::int8_t {
 /// "ok", "unreachable", "bad input".
 const char* to_string(AnalyticStatus status) noexcept;
 
-/// Bits of AnalyticBranch::singular: where two branches have become one.
+/// Bits of AnalyticBranch::singular: the singularities at which two branches coincide.
 enum AnalyticSingularity : std::uint8_t {
   kShoulderSingular = 1,  ///< wrist centre in the plane through axis 1 along axis 2; on axis 1 itself, q1 is free
   kElbowSingular = 2,     ///< stretched or folded; folded onto axis 2 (links of one length), q2 is free
@@ -56,25 +56,26 @@ struct AnalyticNearest {
   AnalyticBranch branch;                             ///< meaningful where status is Ok
 };
 
-/// Inverse kinematics by subproblems with known answers: the wrist centre gives joint 1, then joints 2 and 3 as a
-/// planar arm; the orientation that is left gives joints 4, 5, 6. After
+/// Inverse kinematics by subproblems with closed-form solutions: the wrist centre gives joint 1, then joints 2 and 3 as
+/// a planar arm; the remaining orientation gives joints 4, 5, 6. After
 ///   D. Pieper, "The kinematics of manipulators under computer control", PhD thesis, Stanford, 1968;
 ///   B. Paden, "Kinematics and control of robot manipulators", PhD thesis, UC Berkeley, 1985 (after W. Kahan);
 ///   R. Murray, Z. Li, S. Sastry, "A Mathematical Introduction to Robotic Manipulation", CRC Press, 1994, section 3.3.
 ///
-/// Covers every chain of six revolute or continuous joints, however its frames, signs and zeros are laid, where
+/// The class covers every chain of six revolute or continuous joints, with any frames, signs and zeros, where
 ///   - axes 4, 5, 6 meet in one point, the wrist centre; axis 5 is parallel to neither 4 nor 6;
 ///   - axes 2 and 3 are parallel and apart, and the wrist centre is off axis 3;
-///   - axis 1 is not parallel to axis 2. It need be neither perpendicular to it nor meet it.
-/// Coincidences hold within 1e-9: rad, or of the arm's size, which is the sum of the distances between the joints'
-/// frames from joint 1 to the tip. What differs (directions, axes 2 and 3) is apart by more than 1e-3: rad, or of the
-/// planar arm's length. An arm that only just meets the tolerance has answers as exact as that.
+///   - axis 1 is not parallel to axis 2; the two axes need neither be perpendicular nor meet.
+/// Axes that must meet or be parallel do so within 1e-9: rad, or part of the arm's size, which is the sum of the
+/// distances between the joints' frames from joint 1 to the tip. Directions and axes 2 and 3, which must differ, differ
+/// by more than 1e-3: rad, or part of the planar arm's length. The answers of an arm that only just meets the tolerance
+/// are only as exact as the tolerance.
 ///
-/// Answers reproduce the pose to rounding. A pose within 1e-12 (rad, or of size and mounting distance) of a singularity
-/// counts as singular, and is reproduced to that; one as little out of reach counts as reached by the stretched arm. A
-/// rotation that is one only to single precision is taken as the rotation nearest to it. One thing can get lost: where
-/// the axes of the wrist are not at right angles, a pose within 1e-6 of all three singularities at once may count as
-/// unreachable.
+/// Answers reproduce the pose to rounding. A pose within 1e-12 (rad, or part of size and mounting distance) of a
+/// singularity counts as singular, and the answers reproduce it to 1e-12; a pose that is out of reach by no more than
+/// 1e-12 counts as reached by the stretched arm. A rotation matrix of single precision is replaced by the nearest
+/// rotation. One weakness: where the axes of the wrist are not at right angles, a pose within 1e-6 of all three
+/// singularities at once may count as unreachable.
 ///
 /// A value: cheap to copy, safe to use from many threads.
 class AnalyticIk {
@@ -84,17 +85,18 @@ class AnalyticIk {
 
   /// Every posture of `pose` (tip in base), also those outside the limits. Real time.
   ///
-  /// Each joint is on the turn nearest to 0 within its limits; where there is none, in (−π, π]. Order: shoulder, elbow,
-  /// wrist, each first the one, then the other way, so that a branch keeps its place among the eight of a regular pose.
-  /// Branches that have become one at a singularity are given once; a free angle is as close to 0 as limits allow (and,
-  /// where an oblique wrist then cannot do the rest, the next of 32 around the circle at which it can).
+  /// Each joint is on the turn nearest to 0 within its limits; if no turn is within the limits, in (−π, π]. Branches
+  /// are ordered by shoulder, elbow and wrist, so that a branch keeps its place among the eight of a regular pose.
+  /// Branches that coincide at a singularity are given once; a free angle is as close to 0 as limits allow (if an
+  /// oblique wrist then cannot reach the orientation, the free angle is the next of 32 around the circle at which the
+  /// wrist can).
   AnalyticSolutions solve(const Pose& pose) const noexcept;
 
-  /// The posture of `pose` nearest to q (6,) [rad]: one within the limits where there is one, and of these the one of
-  /// the smallest Euclidean norm of the differences. Real time.
+  /// The posture of `pose` nearest to q (6,) [rad], by the Euclidean norm of the joint differences. If any posture is
+  /// within the limits, only such postures count. Real time.
   ///
-  /// Each joint is on the turn nearest to q within its limits; where there is none, on the turn nearest to q. An angle
-  /// that the pose leaves free stays as in q, or at the limit that q is beyond.
+  /// Each joint is on the turn nearest to q within its limits; if no turn is within the limits, on the turn nearest to
+  /// q. An angle that the pose leaves free stays as in q, or at the limit that q is beyond.
   AnalyticNearest nearest(const Pose& pose, const JointRef& q) const noexcept;
 
   /// The arm.

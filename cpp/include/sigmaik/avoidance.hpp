@@ -1,7 +1,7 @@
 #pragma once
 /// \file avoidance.hpp
-/// A posture velocity that leads away from singularities: where an arm is redundant, the servo follows it without
-/// moving the tool.
+/// A posture velocity that leads away from singularities: where an arm is redundant, the servo follows this velocity
+/// without moving the tool.
 
 #include <limits>
 #include <optional>
@@ -14,7 +14,7 @@
 
 namespace sigmaik {
 
-/// What leads away.
+/// The function whose gradient leads away from singularities.
 enum class Avoid {
   None,
   Manipulability,  ///< the gradient of √det(JJᵀ), everywhere (Yoshikawa 1985)
@@ -23,7 +23,7 @@ enum class Avoid {
 
 /// Settings of Avoidance.
 struct AvoidanceOptions {
-  Avoid what = Avoid::None;  ///< what leads away
+  Avoid what = Avoid::None;  ///< the function whose gradient is followed
   double gain = 1.0;         ///< ≥ 0, q̇ = gain ∇m or −gain ∇Σφ
   double max_speed = 0.5;    ///< [rad/s or m/s] > 0, of the fastest joint: longer velocities are shortened to it
   /// η₁ and η₂ of the potentials. They are lower and wider than a planner's, because a velocity must act before the arm
@@ -31,7 +31,7 @@ struct AvoidanceOptions {
   Potential potential{0.0, 10.0};
 };
 
-/// Real time once made.
+/// Computes the posture velocity away from singularities. Every call after construction is real time.
 class Avoidance {
  public:
   /// \throws Error where an option is out of its range, or potentials are asked for of an arm whose sets are not known

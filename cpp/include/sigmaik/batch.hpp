@@ -18,7 +18,7 @@ struct BatchShape {
 };
 
 /// Solves `count` problems, each as a fresh VelocitySolver would: the answers depend neither on their order nor on
-/// `threads`. No heap apart from starting the threads.
+/// `threads`. Only the start of the threads uses the heap.
 /// \param jacobian (B, m, n) in C order
 /// \param twist (B, m)
 /// \param qdot out: (B, n); zero where the problem is not finite

@@ -42,7 +42,7 @@ struct Segment {
   double jerk = std::numeric_limits<double>::infinity();          ///< [rad/s³ or m/s³], > 0
   double effort = std::numeric_limits<double>::infinity();        ///< [N·m or N], > 0
   std::optional<Inertia> inertia;                                 ///< of the link, where it is known
-  /// What a reader made of values that say nothing, one sentence each: the chain hands them on as warnings().
+  /// How a reader took values that have no meaning, one sentence each: warnings() of the chain contains these notes.
   std::vector<std::string> notes;
 };
 
@@ -56,10 +56,10 @@ struct JointLimits {
   JointVector effort;        ///< [N·m or N]
 };
 
-/// What the kinematics need of a movable joint: constants, laid out for one flat pass. Fixed joints are
-/// folded in, and frames are turned so that every axis is z.
+/// Constants of a movable joint for the kinematics, laid out for one flat pass. Fixed joints are folded in, and frames
+/// are turned so that every axis is z.
 struct JointConstants {
-  Eigen::Matrix3d rotation;     ///< this joint's frame in the last one's
+  Eigen::Matrix3d rotation;     ///< this joint's frame in the frame of the joint before
   Eigen::Vector3d translation;  ///< [m]
   bool prismatic;               ///< true: slides along z; false: turns about z
 };
@@ -94,24 +94,24 @@ class Chain {
   const std::vector<JointType>& joint_types() const noexcept { return model_->joint_types; }
   /// Limits of the movable joints, (n,) each.
   const JointLimits& limits() const noexcept { return model_->limits; }
-  /// Everything, fixed joints included.
+  /// All segments, fixed joints included.
   const std::vector<Segment>& segments() const noexcept { return model_->segments; }
 
   /// The same arm with other limits.
   /// \throws Error where sizes or values do not fit
   Chain with_limits(const JointLimits& limits) const;
 
-  /// What is wrong with the model and does not keep the arm from moving, one sentence each: limits of zero in a URDF,
-  /// which count as none, and inertias that no rigid body has. Python warns of them when it reads a URDF.
+  /// Faults of the model that do not keep the arm from moving, one sentence each: limits of zero in a URDF, which count
+  /// as no limit, and inertias that no rigid body has. Python warns of these faults when it reads a URDF.
   const std::vector<std::string>& warnings() const noexcept { return model_->warnings; }
 
-  /// What a servo of this arm cannot hold, one sentence a kind of limit: velocity and acceleration limits that joints
-  /// lack. Python warns of them where a servo is made.
+  /// Velocity and acceleration limits that joints lack, so that a servo cannot hold them: one sentence for each kind of
+  /// limit. Python warns of missing limits where a servo is made.
   /// \param velocity, acceleration whether the kind matters
   std::vector<std::string> missing_limits(bool velocity = true, bool acceleration = true) const;
 
-  /// One sentence for each joint that is outside its position limits by more than 1 rad or 1 m at q (n,): a start there
-  /// is rather a mistake of units than a posture. Python warns of them where a servo is reset.
+  /// One sentence for each joint that is outside its position limits by more than 1 rad or 1 m at q (n,): such a start
+  /// is more likely a mistake of units than a posture. Python warns of these joints where a servo is reset.
   /// \throws Error where the size is wrong
   std::vector<std::string> far_outside_limits(const JointRef& q) const;
 

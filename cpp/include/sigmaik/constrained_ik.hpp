@@ -9,8 +9,8 @@
 ///     |α e^ap|² + |β (J^ap Δq − Δx_d^ap)|² + |γ ϑ|²                        (24), (25), (34)
 ///
 /// where e^ex = 0 (26), inside the joints' limits (13)–(16), (27), (28). e = x − x_d* is the pose's error, in an exact
-/// part and an approximate part; x_d* = x_d − Δx_d ϑ is the target, slowed down by ϑ in [0, 1] (33). β is what keeps
-/// the joints from oscillating: without active limits an error decays by the factor β²/(α²+β²) a cycle.
+/// part and an approximate part; x_d* = x_d − Δx_d ϑ is the target, slowed down by ϑ in [0, 1] (33). β keeps the joints
+/// from oscillating: without active limits an error decays by the factor β²/(α²+β²) a cycle.
 ///
 /// Rotations are linearised on their manifold: for φ = log(R R_dᵀ), φ̇ = J_l⁻¹(φ) ω, exactly, so that large errors
 /// converge as fast as small ones.
@@ -35,7 +35,7 @@
 
 namespace sigmaik {
 
-/// Settings of ConstrainedIk. Six numbers are one a row (vx, vy, vz, ωx, ωy, ωz), in the task's axes.
+/// Settings of ConstrainedIk. Six numbers are one for each row (vx, vy, vz, ωx, ωy, ωz), in the task's axes.
 struct ConstrainedIkOptions {
   double dt = 1e-3;                                                  ///< [s] > 0, from one update to the next
   Task task{};                                                       ///< rows that matter at all, and their axes
@@ -45,8 +45,8 @@ struct ConstrainedIkOptions {
   /// gives 25 ms at any dt.
   Twist beta = Twist::Constant(5.0);
   std::optional<double> gamma{};  ///< > 0, weight of the time scaling ϑ; none: ϑ = 0
-  /// > 0, largest error of the approximate rows [m, rad], each for itself; infinite for none. Where the largest errors
-  /// and the exact part exclude each other, the largest errors are let go, and the step says so (error_active).
+  /// > 0, largest error of the approximate rows [m, rad], for each row separately; infinite for none. Where max_error
+  /// and the exact part exclude each other, max_error is given up, and error_active says so.
   Twist max_error = Twist::Constant(std::numeric_limits<double>::infinity());
   int iterations = 2;          ///< ≥ 1, linearisations a step
   bool torque_limits = false;  ///< hold the chain's effort limits: M q̈ + C q̇ + g, with the inertias of the chain
@@ -56,7 +56,7 @@ struct ConstrainedIkOptions {
   LimitOptions limits{};  ///< which of the chain's limits are held; see limits.hpp
 };
 
-/// Where a step comes from.
+/// How a step was computed.
 enum class IkSource : std::int8_t { Analytic, Optimised };
 
 /// "analytic", "optimised".
@@ -66,19 +66,21 @@ const char* to_string(IkSource source) noexcept;
 struct ConstrainedIkStep {
   JointVector q;     ///< (n,) position command
   JointVector qdot;  ///< (n,) velocity command over the last dt
-  /// Ok: the target is met. Damped: not met, and no limit is to blame. Limited: a limit holds the step back. BadInput.
+  /// Ok: the target is met. Damped: the target is not met, and no limit is the cause. Limited: a limit holds the step
+  /// back. BadInput.
   Status status = Status::BadInput;
   Twist error = Twist::Zero();          ///< [m, rad] tip minus target, after the step
   Twist path_error = Twist::Zero();     ///< the same, of the target slowed down by ϑ; equal where ϑ = 0
-  double time_scale = 0.0;              ///< ϑ in [0, 1]: 0 as asked, 1 a complete stop; how hard the step is
+  double time_scale = 0.0;              ///< ϑ in [0, 1]: 0 as asked, 1 a complete stop; shows how hard the step is
   std::uint16_t active = 0;             ///< bit i: a limit of joint i is active
   bool torque_active = false;           ///< a torque limit is active, or cannot be met
-  bool error_active = false;            ///< max_error is active, or has been let go
+  bool error_active = false;            ///< max_error is active, or has been given up
   bool exact_met = true;                ///< the exact part's linearised equations hold
   IkSource used = IkSource::Optimised;  ///< where the step comes from
 };
 
-/// Follows a target pose, one step a cycle. Keeps its own reference configuration and reads no measured positions.
+/// Follows a target pose, one step a cycle. The object keeps its own reference configuration and reads no measured
+/// positions.
 class ConstrainedIk {
  public:
   /// \throws Error where an option is out of its range, or torque limits are asked for without inertias or efforts
@@ -88,18 +90,19 @@ class ConstrainedIk {
   /// \throws Error where a size is wrong or an entry is not finite
   void reset(const JointRef& q, const JointRef& qdot = JointVector());
 
-  /// One cycle towards a pose of the tip in base. Real time. A target that is not a pose: BadInput, and the arm stops.
+  /// One cycle towards a pose of the tip in base. Real time. If the target is not a pose, the status is BadInput and
+  /// the arm stops.
   ConstrainedIkStep update(const Pose& target) noexcept;
-  /// The same: an older name.
+  /// The older name of update().
   ConstrainedIkStep step(const Pose& target) noexcept { return update(target); }
 
   /// The arm.
   const Chain& chain() const noexcept { return chain_; }
   /// The settings, as given.
   const ConstrainedIkOptions& options() const noexcept { return options_; }
-  /// Whether the closed form is at hand.
+  /// Whether the closed form is available.
   bool has_analytic() const noexcept { return analytic_.has_value(); }
-  /// (n,) where the reference stands; empty before reset().
+  /// (n,) the reference configuration; empty before reset().
   const JointVector& q() const noexcept { return tracker_.q(); }
   /// Pose of the tip at q().
   const Pose& tip() const noexcept { return state_.tip; }

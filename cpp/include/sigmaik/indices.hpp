@@ -2,10 +2,10 @@
 /// \file indices.hpp
 /// How far from singular: indices of a Jacobian and their gradients in the joints.
 ///
-/// All come from the singular values σ_1 ≥ … ≥ σ_m of an m×n Jacobian J; where n < m the missing ones are zero, as such
-/// a task cannot be done whole. Where an index is said to be infinite at a singularity, that is where σ_m ≤ 1e-14 σ_1,
-/// which is what rounding leaves of a zero. Lengths and angles mix in J: `length_scale` [m] says how much of a length
-/// weighs as much as one radian, as in VelocitySolver.
+/// All indices are functions of the singular values σ_1 ≥ … ≥ σ_m of an m×n Jacobian J. Where n < m the missing values
+/// are zero, because the arm cannot do all rows of such a task. "Infinite at a singularity" means infinite where σ_m ≤
+/// 1e-14 σ_1, because rounding leaves this much of a zero. Lengths and angles mix in J: `length_scale` [m] is the
+/// length that weighs as much as one radian, as in VelocitySolver.
 
 #include <cstddef>
 #include <string>
@@ -30,7 +30,7 @@ enum class Index {
 /// "manipulability", "condition_number", "min_singular_value", "geometry_aware".
 const char* to_string(Index index) noexcept;
 
-/// λ = σ² that a metre-sized arm's largest eigenvalue of JJᵀ does not exceed: k where nothing else is known.
+/// The default of k: an upper bound of the largest eigenvalue σ² of JJᵀ for an arm of about one metre.
 inline constexpr double kDefaultScale = 6.0;
 
 /// Settings of IndexFunction.
@@ -49,20 +49,20 @@ class IndexFunction {
 
   /// Which index.
   Index index() const noexcept { return index_; }
-  /// Rows of the Jacobians that it takes; 0: any.
+  /// Number of rows that a Jacobian must have; 0: any number.
   int rows() const noexcept { return static_cast<int>(whiten_.rows()); }
 
-  /// Of an m×n Jacobian of finite entries; from the fourth on its rows are angular. Real time.
+  /// The index of an m×n Jacobian with finite entries; rows from the fourth on are angular. Real time.
   double value(const TaskJacobianRef& jacobian) const noexcept;
 
-  /// Of a chain at q (n,), with the gradient (n,) [per rad or m]. Real time.
+  /// The index of a chain at q (n,), with the gradient (n,) [per rad or m]. Real time.
   ///
   /// Closed form through ∂J/∂q: ∂σ_i/∂q_k = u_iᵀ ∂_kJ v_i. The gradient is always finite. Where an index is not
-  /// differentiable it is the slope along the u_i, v_i that the decomposition picked: at a repeated σ_min, and at σ_min
-  /// = 0, where the slope of |σ| has either sign. Where the index is +inf (condition number, geometry-aware, at a
-  /// singularity) nothing points out, and the gradient is zero.
+  /// differentiable, the gradient is the slope along the u_i, v_i that the decomposition chose: at a repeated σ_min,
+  /// and at σ_min = 0, where the slope of |σ| has either sign. Where the index is +inf (condition number,
+  /// geometry-aware, at a singularity), no direction leads out, and the gradient is zero.
   double value(const Chain& chain, const JointRef& q, JointVector& gradient) const noexcept;
-  /// The same, from J and its chain alone.
+  /// The same from the Jacobian of a chain alone.
   double gradient(const Jacobian& jacobian, JointVector& gradient) const noexcept;
 
  private:
@@ -71,7 +71,7 @@ class IndexFunction {
   TaskMatrix whiten_;  // Σ^{-1/2}, or empty
 };
 
-/// Π σ_i of an m×n Jacobian. Real time, as all of these.
+/// Π σ_i of an m×n Jacobian. Real time, as the next three functions.
 double manipulability(const TaskJacobianRef& jacobian) noexcept;
 /// σ_1/σ_m, +inf where σ_m = 0.
 double condition_number(const TaskJacobianRef& jacobian) noexcept;
@@ -80,9 +80,9 @@ double min_singular_value(const TaskJacobianRef& jacobian) noexcept;
 /// Σ log²(σ_i²/k), +inf where a σ_i = 0.
 double geometry_aware(const TaskJacobianRef& jacobian, double k = kDefaultScale) noexcept;
 
-/// k of a chain: kDefaultScale where the largest eigenvalue of JJᵀ over the joint ranges stays below it by a tenth,
-/// else that eigenvalue times 1.1, so that the sphere Σ = kI holds every ellipsoid. Found by 1000 quasi-random
-/// configurations and an ascent from the best: the same on every machine, a few ms.
+/// k of a chain: kDefaultScale, or the largest eigenvalue of JJᵀ over the joint ranges times 1.1 if this is larger, so
+/// that the sphere Σ = kI contains every ellipsoid. The search takes 1000 quasi-random configurations and an ascent
+/// from the best one. The result is the same on every machine, and takes a few ms.
 double reference_scale(const Chain& chain, double length_scale = 1.0);
 
 /// Values, and gradients where `gradient` is not null, at `count` configurations.

@@ -10,7 +10,7 @@
 
 namespace sigmaik {
 
-/// Scratch and result of update(). One a thread; no heap.
+/// Memory and result of update(), one object for each thread; no heap.
 struct ChainState {
   Pose tip = Pose::Identity();  ///< tip in base
   Jacobian jacobian;            ///< 6×n, [v; ω] in base axes at the tip's origin
@@ -26,7 +26,7 @@ bool update(const Chain& chain, const JointRef& q, ChainState& state) noexcept;
 /// Pose alone. Real time; q must have chain.dof() finite entries.
 Pose pose(const Chain& chain, const JointRef& q) noexcept;
 
-/// ∂J/∂q_k from J alone, the first dof() entries of `gradient`. With J_i = [v_i; ω_i]:
+/// ∂J/∂q_k from J alone, in the first dof() entries of `gradient`. With J_i = [v_i; ω_i]:
 ///   k ≤ i: ∂J_i/∂q_k = [ω_k × v_i; ω_k × ω_i],   k > i: ∂J_i/∂q_k = [ω_i × v_k; 0]
 /// (a prismatic joint has ω = 0). Real time.
 void jacobian_gradient(const Jacobian& jacobian, JacobianGradient& gradient) noexcept;

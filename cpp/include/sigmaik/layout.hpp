@@ -1,6 +1,6 @@
 #pragma once
 /// \file layout.hpp
-/// A program and the library that it links must agree on the size of every public type. Where they do not (headers of
+/// A program and the library that it links must agree on the size of every public type. Where sizes differ (headers of
 /// another version, another Eigen, a compiler option that changes types), linking fails, and the message names the
 /// type: "undefined reference to sigmaik::detail::Layout<…Sized<sigmaik::ServoOptions, 528ul>…>::in_library".
 ///

@@ -5,9 +5,9 @@
 ///     min |A x − b|²   where   C x = d,   lower ≤ x ≤ upper,   G x ≤ h
 ///
 /// in the tradition of Lawson and Hanson (Solving Least Squares Problems, 1974) and Björck (Numerical Methods for Least
-/// Squares Problems, 1996): orthogonal transformations, no normal equations. There is always an answer. What cannot be
-/// had at once is given up in this order, each as little as possible (in the least-squares sense) before the next
-/// is looked at (Kanoun, Lamiraux and Wieber 2011; Escande, Mansard and Wieber 2014):
+/// Squares Problems, 1996): orthogonal transformations, no normal equations. There is always an answer. Where the
+/// levels exclude each other, each level is violated as little as possible (in the least-squares sense) before the next
+/// level is considered (Kanoun, Lamiraux and Wieber 2011; Escande, Mansard and Wieber 2014):
 ///
 ///     0. lower ≤ x ≤ upper     always kept
 ///     1. G x ≤ h               min |max(0, G x − h)|²
@@ -15,7 +15,7 @@
 ///     3. A x ≈ b               min |A x − b|²
 ///     4.                       min |x|²
 ///
-/// The last makes the answer unique where ranks are short.
+/// Level 4 makes the answer unique where matrices are rank-deficient.
 
 #include <cstdint>
 
@@ -29,7 +29,7 @@ inline constexpr int kMaxObjectives = 32;    ///< rows of A
 inline constexpr int kMaxEqualities = 8;     ///< rows of C
 inline constexpr int kMaxInequalities = 32;  ///< rows of G
 
-/// Bounded, so none touches the heap.
+/// One number for each unknown. All sizes are bounded, so no type uses the heap.
 using UnknownVector = Eigen::Matrix<double, Eigen::Dynamic, 1, kLayout, kMaxUnknowns, 1>;
 /// One number a row of A, C or G, up to 32.
 using RowVector = Eigen::Matrix<double, Eigen::Dynamic, 1, kLayout, kMaxObjectives, 1>;
@@ -50,11 +50,11 @@ struct LeastSquaresProblem {
   RowVector h;          ///< (k,), +∞ where there is no bound
 };
 
-/// What solve() did.
+/// How solve() ended.
 enum class LeastSquaresStatus : std::int8_t {
   Optimal = 0,     ///< every constraint is met
   Infeasible = 1,  ///< G x ≤ h or C x = d cannot be met: as well as possible, in the order above
-  StepLimit = 2,   ///< inside the bounds, but the last step was not the last needed
+  StepLimit = 2,   ///< inside the bounds, but more steps would be needed
   BadInput = 3,    ///< sizes that do not fit, NaN, infinite entries, lower > upper: x is zero
 };
 
@@ -73,8 +73,8 @@ struct LeastSquaresSolution {
   double equality_error = 0.0;  ///< |C x − d|
 };
 
-/// Solves problems one after the other; what one had active is the next one's first guess. The answer does not depend
-/// on the guess where it is unique to rounding.
+/// Solves problems one after the other; the active set of an answer is the first guess for the next problem. Where the
+/// answer is unique to rounding, the answer does not depend on the guess.
 class LeastSquares {
  public:
   /// Real time: no heap, a bounded number of steps.

@@ -1,35 +1,40 @@
 #pragma once
 /// \file limits.hpp
 /// Bounds on the coming cycle's joint velocity, so that position, velocity, acceleration and jerk limits hold now and
-/// can be held for ever, whatever is chosen inside the bounds.
+/// can be held for ever, whichever velocity is chosen inside the bounds.
 ///
 /// Limits are meant in discrete time, as a robot's controller checks them: with q_k = q_{k−1} + v_k dt they hold for
-/// q_k, v_k, a_k = (v_k − v_{k−1}) / dt and (a_k − a_{k−1}) / dt. Joints do not know of one another.
+/// q_k, v_k, a_k = (v_k − v_{k−1}) / dt and (a_k − a_{k−1}) / dt. Each joint is treated separately.
 ///
-/// Without a jerk limit. v may be chosen if the fastest stop after it, v, v − A dt, v − 2 A dt, …, ends inside:
+/// *Without a jerk limit.* A velocity v may be chosen if the fastest stop after it, v, v − A dt, v − 2 A dt, …, ends
+/// inside:
 ///
 ///     D(v) = Σ_{j≥0} max(v − j A dt, 0) dt ≤ upper − q.
 ///
-/// D is convex and piecewise linear, so its inverse is the least of its lines: D⁻¹(d) = min_N d/((N+1) dt) + N A dt/2.
-/// Since D(v) = v dt + D(v − A dt), what was allowed leaves v − A dt allowed in the next cycle; 0 is allowed inside the
-/// limits, from either side. So the windows of position, velocity and acceleration meet pairwise, and three intervals
-/// that meet pairwise have a point in common: there are bounds for ever.
+/// D is convex and piecewise linear, so D⁻¹ is the minimum of its lines: D⁻¹(d) = min_N d/((N+1) dt) + N A dt/2. Since
+/// D(v) = v dt + D(v − A dt), an allowed v leaves v − A dt allowed in the next cycle; inside the limits 0 is allowed,
+/// from either side. So the intervals of position, velocity and acceleration intersect pairwise, and three intervals
+/// that intersect pairwise have a common point: there are bounds for ever.
 ///
-/// With a jerk limit. The tracker keeps a way to stop: the continuous velocity that starts with the present v and a
-/// slope s and comes to rest in the least time under |v'| ≤ A, |v''| ≤ J.
-///   - Samples of it hold the limits: their differences are means of v' over a cycle, and those change by ≤ J dt a
-///     cycle. The first does too, if |s − a_k| ≤ J dt/2.
-///   - Its later part is the fastest stop from there. So its next sample may always be chosen, with its slope.
-///   - Fastest stops are ordered: of two, the one that starts with no less v and no less s has no less v(t) ever after.
-///     (Where both meet, the lower one would have the larger slope, and could stop only beyond the other.)
-/// So along a line of choices (v, s), both growing, through the next sample of the stop that is kept, those whose own
-/// stop stays inside upper limits reach up to a largest v, and all between have stops inside the lower limits too. That
-/// v is found by bracketing, exactly on the samples: their sums have closed forms. As J → ∞ this is the case above.
+/// *With a jerk limit.* The tracker keeps a stop: the continuous velocity that starts with the present v and a slope s
+/// and comes to rest in the least time under |v'| ≤ A, |v''| ≤ J.
+///   - Samples of this stop hold the limits: their differences are means of v' over a cycle, and these means change by
+///     ≤ J dt a cycle. The first difference does too, if |s − a_k| ≤ J dt/2.
+///   - The later part of the stop is the fastest stop from there. So the next sample of the stop may always be chosen,
+///     with its slope.
+///   - Fastest stops are ordered: of two stops, the one that starts with no less v and no less s has no less v(t) at
+///     every later time. (Where both met, the lower stop would have the larger slope, and could stop only beyond the
+///     other.)
+/// Consider a line of choices (v, s), both growing, through the next sample of the stop that is kept. Choices whose own
+/// stop stays inside the upper limits reach up to a largest v, and all choices between have stops inside the lower
+/// limits too. Bracketing finds this v, exactly on the samples, because their sums have closed forms. As J → ∞ this is
+/// the case without a jerk limit.
 ///
 /// Where a limit is broken already (reset() outside it, or too fast to stop before it), acceleration and jerk are held
-/// first, as the motors can do no more, then velocity, then position: each comes back as fast as those before it allow,
-/// and then stays. Leaving a limit is never held back. The bounds are continuous functions of the state; only where a
-/// joint with a jerk limit can stop neither below its upper nor above its lower limit, they meet in the stop.
+/// first, because the motors can do no more, then velocity, then position: each of these comes back as fast as the
+/// limits before it allow, and then stays inside. A motion that leaves a limit is never held back. The bounds are
+/// continuous functions of the state; only where a joint with a jerk limit can stop neither below its upper nor above
+/// its lower limit, both bounds are at the stop.
 
 #include <array>
 #include <cstdint>
@@ -40,14 +45,14 @@
 
 namespace sigmaik {
 
-/// Which of a chain's limits a LimitTracker holds, and how an arm comes back that starts outside them.
+/// Selects the limits of a chain that a LimitTracker holds, and the least speed of a recovery.
 struct LimitOptions {
   bool position = true;      ///< whether the chain's position limits are held
   bool velocity = true;      ///< whether the chain's velocity limits are held
   bool acceleration = true;  ///< whether the chain's acceleration limits are held
   bool jerk = true;          ///< whether the chain's jerk limits are held
-  /// In (0, 1], of the velocity limit: how fast a joint that is outside its position limits must at least come back.
-  /// Without a velocity limit: its way back, or 1 mm or 1 mrad if that is more, in 0.1 s.
+  /// In (0, 1], part of the velocity limit: the least speed at which a joint outside its position limits comes back. A
+  /// joint without a velocity limit covers its way back, or 1 mm or 1 mrad if this is more, in 0.1 s.
   double recovery_speed = 0.1;
 };
 
@@ -88,17 +93,17 @@ class LimitTracker {
   /// \throws Error where a size is wrong or an entry is not finite
   void reset(const JointRef& q, const JointRef& qdot = JointVector());
 
-  /// Starts where another tracker of as many joints stands, in the midst of its motion: with its positions, velocities
-  /// and, of joints with a jerk limit there, accelerations. Limits that did not hold there hold as after a reset().
-  /// Where the other has not started, nothing happens. Real time.
+  /// Takes over the motion of another tracker with as many joints: its positions, its velocities and, of joints that
+  /// have a jerk limit there, its accelerations. Limits that the other tracker did not hold are treated as after a
+  /// reset(). If the other tracker has not started, nothing happens. Real time.
   /// \throws Error where the number of joints or dt differ
   void continue_from(const LimitTracker& other);
 
-  /// Of the coming cycle; empty before reset().
+  /// Bounds of the coming cycle; empty before reset().
   const VelocityBounds& bounds() const noexcept { return bounds_; }
 
-  /// What position and velocity limits alone allow, with room to stop: where a joint may be heading, although it takes
-  /// acceleration, and time, to get there. lower ≤ upper. Real time.
+  /// The heading bounds: velocities that position and velocity limits alone allow, with room to stop. A joint needs
+  /// acceleration, and time, to reach such a velocity. lower ≤ upper. Real time.
   VelocityBounds heading() const noexcept;
 
   /// (n,) [rad/s or m/s], inside the bounds: the coming cycle of the fastest stop.
@@ -109,7 +114,8 @@ class LimitTracker {
   /// \return whether an entry was moved
   bool advance(JointVector& qdot) noexcept;
 
-  /// (n,) [rad or m]: the sum of all cycles. Within rounding of a position limit it is on the limit, never beyond.
+  /// (n,) [rad or m]: the sum of all cycles. A position within rounding of a limit is set to the limit, and is never
+  /// beyond.
   const JointVector& q() const noexcept { return q_; }
   /// (n,) [rad/s or m/s], of the last cycle.
   const JointVector& qdot() const noexcept { return v_; }
@@ -127,10 +133,10 @@ class LimitTracker {
 
  private:
   struct Window;
-  // One number a joint. Velocities are counted as they are, and all else in velocities and cycles: positions [1/dt],
-  // changes of velocity a cycle, and changes of those.
+  // One number for each joint. Velocities keep their unit; all other quantities are in velocities and cycles: positions
+  // [1/dt], changes of velocity in a cycle, and changes of these changes.
   using Numbers = std::array<double, kMaxJoints>;
-  // Of a joint with a jerk limit: its acceleration, and the stop that is kept.
+  // The acceleration of a joint with a jerk limit, and the stop that is kept.
   struct JerkMemory {
     double change = 0.0;      // v_k − v_{k−1}
     double slope = 0.0;       // of the stop that is kept, a cycle
@@ -148,7 +154,7 @@ class LimitTracker {
   // Room to the position limits of joint i [velocities × cycles]; negative outside.
   double room_above(int i) const noexcept { return (upper_[static_cast<std::size_t>(i)] - q_[i]) * per_dt_; }
   double room_below(int i) const noexcept { return (q_[i] - lower_[static_cast<std::size_t>(i)]) * per_dt_; }
-  // How fast joint i comes back that is `outside` [rad or m] its position limits.
+  // The recovery speed of joint i, `outside` [rad or m] beyond a position limit.
   double recovery(int i, double outside) const noexcept;
   // The velocity from which joint i, without a jerk limit, can just stop before a position limit that is `room` away;
   // the velocity that takes joint i back to the limit, where the limit is behind it.

@@ -1,6 +1,6 @@
 #pragma once
 /// \file parameters.hpp
-/// The parameters of a rule, each told once: name, member, range and words. The checks of set-up, and in Python the
+/// The parameters of a rule, each described once: name, member, range and text. The checks of set-up, and in Python the
 /// constructor's keywords, defaults, docstring, stub and errors are made from this table. See rules/jparse.hpp.
 
 #include <limits>
@@ -79,7 +79,7 @@ struct Choice {
 template <typename Enum>
 struct Choices;
 
-/// visit(parameter) for each of R::parameters(), in order.
+/// Calls visit(parameter) for each of R::parameters(), in order.
 template <typename R, typename Visit>
 constexpr void for_each_parameter(Visit&& visit) {
   std::apply([&](const auto&... each) { (visit(each), ...); }, R::parameters());

@@ -1,13 +1,13 @@
 #pragma once
 /// \file pose.hpp
-/// Rotations and poses: what the servo's error is made of.
+/// Rotations and poses, for the servo's pose error.
 
 #include <sigmaik/types.hpp>
 
 namespace sigmaik {
 
-/// Axis times angle [rad] of a rotation, angle in [0, π]. Accurate for the smallest angles and up to π,
-/// where of the two equal answers it takes the one whose first non-zero entry is positive.
+/// Axis times angle [rad] of a rotation, angle in [0, π]. The answer is accurate from the smallest angles up to π. At π
+/// two vectors are equivalent; the answer is the one whose first non-zero entry is positive.
 Eigen::Vector3d rotation_log(const Eigen::Matrix3d& rotation) noexcept;
 
 /// Rotation about `vector` by its length [rad] (Rodrigues).
@@ -24,7 +24,7 @@ Eigen::Vector3d rotation_log_rate(const Eigen::Vector3d& vector, const Eigen::Ve
 /// axis-angle vector of R_target R_currentᵀ; both in base axes.
 Twist pose_error(const Pose& current, const Pose& target) noexcept;
 
-/// Finite, last row 0 0 0 1, and R a rotation (RᵀR = I within 1e-6, det R > 0).
+/// Whether all entries are finite, the last row is 0 0 0 1, and R is a rotation (RᵀR = I within 1e-6, det R > 0).
 bool is_pose(const PoseMatrix& matrix) noexcept;
 
 }  // namespace sigmaik

@@ -1,6 +1,6 @@
 #pragma once
 /// \file rules.hpp
-/// The rules: what each method does with one singular direction, J = Σ σ_i u_i v_iᵀ. One file a rule, in rules/.
+/// The rules: what each method does with one singular direction, J = Σ σ_i u_i v_iᵀ. Each rule has a file in rules/.
 ///
 ///     q̇ = Σ_i g_i v_i + (I − Σ_i p_i v_i v_iᵀ) q̇_posture
 ///
@@ -34,7 +34,7 @@
 
 namespace sigmaik {
 
-/// Some types, to go through one by one.
+/// A list of types that can be visited one by one.
 template <typename... Types>
 struct TypeList {
   /// Template<Types…, More…>.
@@ -48,11 +48,11 @@ struct TypeList {
   }
 };
 
-/// Every rule of the library, in the order of lists and tables. A new rule is a file in rules/ and a word here.
+/// Every rule of the library, in the order of lists and tables. A new rule needs a file in rules/ and its name here.
 using Rules = TypeList<JParse, PseudoInverse, DampedLeastSquares, AdaptiveDampedLeastSquares,
                        SelectivelyDampedLeastSquares, JacobianProjection, JacobianSafety, JacobianSafetyProjection>;
 
-/// One of them with its parameters, or an application's own.
+/// One of the rules with its parameters, or an application's own rule.
 using Method = Rules::Into<std::variant, CustomRule>;
 
 /// "PseudoInverse", …

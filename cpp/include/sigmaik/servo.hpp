@@ -17,18 +17,19 @@
 
 namespace sigmaik {
 
-/// What gives way where a joint limit would be broken. While no limit would be, the rule's answer stands, to the last
-/// digit.
+/// How the command gives way where a joint limit would be broken. While no limit would be broken, the command is the
+/// rule's answer, to the last digit.
 ///
-/// Position and velocity limits decide where the arm is heading. Acceleration and jerk limits decide how fast it gets
-/// there: all joints change in proportion, from the last command towards the new one, so that the tool keeps its
-/// direction while it speeds up. Where this would break a limit, as where one joint brakes as hard as it can, the other
-/// joints do as much of the twist as possible.
+/// Position and velocity limits decide where the arm is heading. Acceleration and jerk limits decide how fast the arm
+/// gets there: all joints change in proportion, from the last command towards the new one, so that the tool keeps its
+/// direction while it speeds up. Where this proportion would break a limit, for example where one joint brakes as hard
+/// as it can, the other joints do as much of the twist as possible.
 enum class OnLimit {
-  /// Other joints take over: of all velocities that the limits allow, those whose twist is nearest to the rule's, and
-  /// of these the nearest to the rule's own, to about 1e-5 of the twist away from singularities. A singular direction
-  /// is weighted as one at the rule's threshold, so that the joints do not move much to make up for little twist.
-  /// J-PARSE's answer, so limited, still never moves the tool away from its target where the limits allow rest.
+  /// The free joints take over. Of all velocities that the limits allow, the answer has the twist nearest to the rule's
+  /// twist, and of these velocities the answer is the nearest to the rule's, to about 1e-5 of the twist away from
+  /// singularities. A singular direction has the weight of a direction at the rule's threshold, so that the joints do
+  /// not move much to make up for little twist. J-PARSE's answer, limited in this way, still never moves the tool away
+  /// from its target where the limits allow rest.
   Redistribute,
   Scale,  ///< the direction is kept, speed is given up: all joints slow down together
 };
@@ -63,9 +64,9 @@ struct ServoStep {
   JointVector qdot;                      ///< (n,) velocity command over the last dt
   Status status = Status::BadInput;      ///< what the cycle did
   Twist pose_error = Twist::Zero();      ///< target minus tip before the step, unshortened; zero for twist commands
-  Twist asked_twist = Twist::Zero();     ///< what the rule was given: the twist command, or the pose error's
+  Twist asked_twist = Twist::Zero();     ///< input of the rule: the twist command, or the twist from the pose error
   Twist achieved_twist = Twist::Zero();  ///< J q̇
-  /// In [0, 1], what limits left: of the rule's speed (Scale), or of its twist along itself (Redistribute).
+  /// In [0, 1], the part that limits left of the rule's speed (Scale), or of its twist along itself (Redistribute).
   double scale = 1.0;
   std::uint16_t limiting_joints = 0;  ///< bit i: joint i is held at a limit that the rule's answer would break
   TaskVector singular_values;         ///< of the weighted task Jacobian, from large to small; empty while holding
@@ -110,9 +111,9 @@ class Servo {
   /// One cycle of the fastest stop that the limits allow, or of rest: Holding. Real time.
   ServoStep hold() noexcept { return stop(Status::Holding); }
 
-  /// Takes over from another servo of the same arm and dt, in the midst of the other's motion: rule and options are
-  /// this servo's, and its command is faded in from the other's last velocity over soft_start. The posture is the
-  /// other's unless the options have one. Where the other has not started, nothing happens. Real time.
+  /// Takes over from another servo of the same arm and dt, while the arm moves: rule and options are this servo's, and
+  /// its command is faded in from the other servo's last velocity over soft_start. The posture is the other servo's
+  /// unless the options have one. If the other servo has not started, nothing happens. Real time.
   /// \throws Error where the number of joints or dt differ
   void continue_from(const Servo& other);
 
@@ -126,7 +127,7 @@ class Servo {
   const ServoOptions& options() const noexcept { return options_; }
   /// The rule.
   const Method& method() const noexcept { return solver_.method(); }
-  /// (n,) where the reference stands; empty before reset().
+  /// (n,) the reference configuration; empty before reset().
   const JointVector& q() const noexcept { return tracker_.q(); }
   /// (n,) velocity of the last cycle.
   const JointVector& qdot() const noexcept { return tracker_.qdot(); }

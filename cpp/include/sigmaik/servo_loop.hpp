@@ -4,11 +4,11 @@
 ///
 ///     ServoLoop loop(servo, [&](const LoopSample& s) { robot.command(s.step.q, s.step.qdot); });
 ///     loop.start();
-///     loop.follow(target, 0.25);     // [s] until it is stale, and the arm stops, unless it is said again
-///     loop.read(samples);            // what was done in each cycle, from any other thread
+///     loop.follow(target, 0.25);     // after 0.25 s without a new command the target is stale, and the arm stops
+///     loop.read(samples);            // a sample for each cycle, from any other thread
 ///
-/// Commands go in and samples come out without a lock in the loop: what commands it may hang, and the arm stops when
-/// its last command is stale. Late cycles are counted and left out, never made up for by a burst.
+/// Commands go in and samples come out without a lock in the loop. A thread that sends commands may hang: the arm
+/// stops when its last command is stale. Late cycles are counted and left out, never made up for by a burst.
 
 #include <atomic>
 #include <cstdint>
@@ -24,22 +24,22 @@
 
 namespace sigmaik {
 
-/// What a cycle followed.
+/// The command that a cycle followed.
 enum class LoopCommand : std::int8_t {
   Hold = 0,  ///< nothing: the arm stops, or rests
   FollowPose = 1,
   FollowTwist = 2,
-  Stale = 3,  ///< a command that was not said again in time: as Hold
+  Stale = 3,  ///< a command that was not repeated in time: as Hold
 };
 
-/// What was done in one cycle.
+/// Record of one cycle.
 struct LoopSample {
   std::int64_t cycle = 0;                   ///< from 0, of those that ran
   double time = 0.0;                        ///< [s] since start()
   LoopCommand command = LoopCommand::Hold;  ///< which command the cycle followed
-  int configuration = 0;           ///< what configure() answered when this cycle's servo was given; 0: the first one
-  bool restarted = false;          ///< the arm was put where it is: see ServoLoop::configure
-  Pose target = Pose::Identity();  ///< of the pose that is followed, else the tip's
+  int configuration = 0;           ///< the number that configure() gave to this cycle's servo; 0: the first servo
+  bool restarted = false;          ///< the servo started from its own reset(): see ServoLoop::configure
+  Pose target = Pose::Identity();  ///< the pose that is followed, else the tip's pose
   Pose tip = Pose::Identity();     ///< after the step, in base
   ServoStep step;                  ///< the servo's answer
 };
@@ -64,7 +64,7 @@ struct ServoLoopOptions {
 /// All functions may be called from any thread.
 class ServoLoop {
  public:
-  /// Called in the loop's thread, once a cycle: real time is then in its hands. Must not throw.
+  /// Called in the loop's thread, once a cycle: the cycle is real time only if the sink is. A sink must not throw.
   using Sink = std::function<void(const LoopSample&)>;
 
   /// \throws Error where the servo has not started, or an option is out of its range
@@ -73,14 +73,14 @@ class ServoLoop {
   ServoLoop(const ServoLoop&) = delete;
   ServoLoop& operator=(const ServoLoop&) = delete;
 
-  /// \throws Error where it runs already, or the system refuses the priority
+  /// \throws Error where the loop runs already, or the system refuses the priority
   void start();
   /// Brings the arm to rest, in a second at most, and ends the thread.
   void stop() noexcept;
   /// Whether the thread runs.
   bool running() const noexcept { return thread_running_.load(std::memory_order_acquire); }
 
-  /// From the next cycle on, for `timeout` seconds.
+  /// Follows a pose from the next cycle on, for `timeout` seconds.
   /// \throws Error where the target is not a pose, or the timeout not above 0
   void follow(const Pose& target, double timeout);
   /// \param twist [v; ω], base axes, at the tip's origin
@@ -88,15 +88,15 @@ class ServoLoop {
   /// Stops the arm as fast as its limits allow, until the next command.
   void hold() noexcept;
 
-  /// Goes on with another servo of the same arm and dt: other rule, other options. From the next cycle on it takes over
-  /// the motion (Servo::continue_from), or with `restart` starts where it was reset to.
-  /// `restart` is for simulation only: a real arm would jump.
-  /// \return a number, one more each time, by which samples name their servo
+  /// Goes on with another servo of the same arm and dt, with another rule or other options. From the next cycle on this
+  /// servo takes over the motion (Servo::continue_from), or with `restart` starts from its last reset(). `restart` is
+  /// for simulation only: a real arm would jump.
+  /// \return a number for LoopSample::configuration, one more at each call
   /// \throws Error where joints or dt differ, or with `restart` the servo has not started
   int configure(Servo next, bool restart = false);
 
   /// Copies out the oldest samples that nobody has read, and forgets them.
-  /// \return how many
+  /// \return the number of samples
   std::size_t read(std::span<LoopSample> out);
 
   /// Counts and times since the start.

@@ -19,7 +19,7 @@
 ///     rules.hpp            Rules, Method: the list of the rules, and one of them or a rule of one's own
 ///     task.hpp             Task: which rows of a twist, in which axes
 ///     velocity_solver.hpp  VelocitySolver: rule and posture → Solution
-///     batch.hpp            solve_batch: many at once
+///     batch.hpp            solve_batch: many problems at once
 ///     limits.hpp           LimitTracker: position, velocity, acceleration and jerk limits → this cycle's bounds
 ///     least_squares.hpp    LeastSquares: equalities, bounds and inequalities, always with an answer
 ///     indices.hpp          IndexFunction: manipulability, condition number, least singular value, geometry-aware index
@@ -42,8 +42,8 @@
 ///     planning/joint_cost.hpp       JointCost: a smooth cost of joint positions, for both planners
 ///     planning/costs.hpp            potentials, manipulability, geometry-aware index as costs; sums of costs
 ///     planning/collision_costs.hpp  costs of obstacles, the arm itself and joint limits; min_distance
-///     planning/cost.hpp             Cost: a weighted sum of costs, before it is known of which arm
-///     planning/costs/known_sets.hpp the singular sets that these two take
+///     planning/cost.hpp             Cost: a weighted sum of costs, made before the arm is known
+///     planning/costs/known_sets.hpp the singular sets of the next two terms
 ///     planning/costs/potential.hpp  Potential: a term of Cost, high near singular sets
 ///     planning/costs/manipulability.hpp Manipulability, LogManipulability: terms
 ///     planning/costs/geometry_aware.hpp GeometryAware: a term, the geometry-aware index
@@ -51,11 +51,11 @@
 ///     planning/clearance.hpp        Clearance: how near a motion comes to singular sets
 ///     planning/trajectory.hpp       Trajectory: a planned motion; sample, retime, save
 ///     planning/collision_check.hpp  CollisionCheck: obstacles that a motion must not touch
-///     planning/time_optimal.hpp     TimeOptimal: motions within limits, away from what a cost marks
+///     planning/time_optimal.hpp     TimeOptimal: motions within limits, away from configurations of high cost
 ///     planning/support_states.hpp   SupportPlanner: smooth motions along which a cost is low, by gradient or samples
 ///     planning/plan.hpp             time_optimal, gradient, stochastic: each planner in one call
 ///     planning/play.hpp             play: a trajectory through a servo
-///     planning/cart.hpp             cart_law: where to drive the cart of a cart-mounted arm, clear of a cylinder
+///     planning/cart.hpp             cart_law: the motion of a cart that carries an arm, clear of a cylinder
 ///     planning/cart_plane.hpp       plane_cart_law: the same with two linear axes
 ///     planning/cart_motion.hpp      CartMotion, PlaneCartMotion: motions of a cart with their measures
 ///

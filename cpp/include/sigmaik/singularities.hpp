@@ -3,9 +3,10 @@
 /// Known singular sets of three arms, potentials around them, and their manipulability in closed form
 /// (Beck et al. 2022, eqs. 14, 24 to 27, 33 to 37; corrected where they do not hold, and completed).
 ///
-/// A set is where all its residuals r vanish, trigonometric polynomials of the joint positions without a unit, scaled
-/// so that near the set ψ = Σ r² is about the squared distance in the joints' space. The number of residuals is the
-/// set's codimension: a set of codimension 1 is a wall, and r changes its sign across it; round others there is a way.
+/// On a singular set all its residuals r vanish. Residuals are trigonometric polynomials of the joint positions without
+/// a unit, scaled so that near the set ψ = Σ r² is about the squared distance in the joints' space. The number of
+/// residuals is the set's codimension: a set of codimension 1 is a wall, and r changes its sign across it; there is a
+/// way round sets of higher codimension.
 
 #include <array>
 #include <memory>
@@ -57,11 +58,11 @@ struct Tape {
 /// chain's (URDF's) angles. Calls on q are real time; a q of a wrong size is a programming error.
 class SingularSets {
  public:
-  /// \throws Error with the names that there are, where none of that name is known
+  /// \throws Error with the known names, where `name` is not one of them
   static SingularSets load(const std::string& name);
   /// Names that load() knows, those of the shipped arms.
   static std::vector<std::string> names();
-  /// Of a chain that has the kinematics of a known arm, whatever its base, tool and names.
+  /// The sets of a chain with the kinematics of a known arm, whatever its base, tool and names.
   static std::optional<SingularSets> of(const Chain& chain);
 
   /// Name of the arm.
@@ -91,9 +92,9 @@ class SingularSets {
 
   /// √det(JJᵀ) in closed form, accurate down to zero.
   double manipulability(const JointRef& q) const noexcept;
-  /// With its gradient, zero on a singular set, where there is none.
+  /// The same with its gradient (n,), which is zero on a singular set, where no gradient exists.
   double manipulability(const JointRef& q, JointVector& gradient) const noexcept;
-  /// With its gradient (n,) and Hessian (n, n), both zero on a singular set, where there is none.
+  /// The same with its gradient (n,) and Hessian (n, n), which are zero on a singular set, where neither exists.
   double manipulability(const JointRef& q, JointVector& gradient, JointMatrix& hessian) const noexcept;
 
   /// The residuals as an expression in the chain's joint positions.
@@ -101,7 +102,7 @@ class SingularSets {
   /// The terms whose squares add up to m², as an expression in the chain's joint positions.
   Tape manipulability_tape() const;
 
-  /// What is known of one arm.
+  /// Data and formulas of one arm.
   class Model;
 
  private:

@@ -2,10 +2,10 @@
 /// \file spectrum.hpp
 /// The singular value decomposition under every rule: J = Σ σ_i u_i v_iᵀ.
 ///
-/// One-sided Jacobi (Hestenes 1958): plane rotations U make the columns of Jᵀ U orthogonal; their lengths
-/// are the singular values and their directions the v_i. It does not square the condition number, finds
-/// small σ_i as accurately as the entries of J allow, and a start from the last cycle's U leaves little to
-/// rotate when J has moved little.
+/// One-sided Jacobi (Hestenes 1958): plane rotations U make the columns of Jᵀ U orthogonal; their lengths are the
+/// singular values and their directions the v_i. The method does not square the condition number, and finds small σ_i
+/// as accurately as the entries of J allow. A start from the last cycle's U leaves little to rotate when J has moved
+/// little.
 
 #include <array>
 #include <cstdint>
@@ -34,7 +34,7 @@ class Spectrum {
   double sigma(int i) const noexcept { return sigma_[static_cast<std::size_t>(i)]; }
   /// u_i (m,), i < m: an orthonormal basis of the task's rows.
   auto u(int i) const noexcept { return u_.col(i).head(m_); }
-  /// u_0 … as columns, for rows() == kRows known when compiling.
+  /// u_0 … as columns, for rows() == kRows known at compile time.
   template <int kRows>
   auto basis() const noexcept {
     return u_.template topLeftCorner<kRows, kRows>();

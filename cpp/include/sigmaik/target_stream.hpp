@@ -1,7 +1,7 @@
 #pragma once
 /// \file target_stream.hpp
-/// Stamped samples of a pose in, one smooth target a cycle out: what stands between a camera, a tracker or a hand and
-/// a Servo.
+/// Stamped samples of a pose in, one smooth target a cycle out: the link between a camera, a tracker or a hand and a
+/// Servo.
 
 #include <array>
 #include <cstdint>
@@ -22,21 +22,21 @@ enum class StreamMode {
 /// Settings of a TargetStream.
 struct TargetStreamOptions {
   StreamMode mode = StreamMode::Predict;  ///< how targets are made of samples
-  double max_speed = 1.5;          ///< [m/s] > 0: nothing is faster. A sample that would have to be is an outlier.
+  double max_speed = 1.5;          ///< [m/s] > 0: the target is never faster. A sample that needs more is an outlier.
   double max_angular_speed = 4.0;  ///< [rad/s] > 0
-  /// [s] ≥ 0, time constant of the way from where the target is to where a new sample says it is; at 0 the twist jumps.
+  /// [s] ≥ 0, time constant of the decay of the difference that a new sample makes; at 0 the twist jumps.
   double smoothing = 0.05;
-  double latency = 0.1;              ///< [s] ≥ 0, Interpolate plays so late: the sensor's delay, and one or two samples
-  double horizon = 0.1;              ///< [s] ≥ 0: so long after its last sample the target moves on as it did, …
-  double timeout = 0.3;              ///< [s] ≥ horizon, > 0: … and by then it has come to rest, and the stream is stale
-  double noise_linear = 2e-3;        ///< [m] > 0, standard deviation of a sample, each axis
-  double noise_angular = 1e-2;       ///< [rad] > 0
-  double acceleration_linear = 3.0;  ///< [m/s²] > 0, standard deviation of what the target may do between samples
+  double latency = 0.1;                ///< [s] ≥ 0, delay of Interpolate: the sensor's delay, and one or two samples
+  double horizon = 0.1;                ///< [s] ≥ 0: how long the target keeps its twist after the last sample
+  double timeout = 0.3;                ///< [s] ≥ horizon, > 0: by then the target is at rest, and the stream is stale
+  double noise_linear = 2e-3;          ///< [m] > 0, standard deviation of a sample, each axis
+  double noise_angular = 1e-2;         ///< [rad] > 0
+  double acceleration_linear = 3.0;    ///< [m/s²] > 0, standard deviation of the target's acceleration between samples
   double acceleration_angular = 10.0;  ///< [rad/s²] > 0
-  int relocate = 5;  ///< ≥ 1: so many refused samples in a row that agree with each other are believed
+  int relocate = 5;  ///< ≥ 1: so many refused samples in a row that agree with each other are accepted
 };
 
-/// What became of a sample.
+/// How a sample was treated.
 enum class SampleStatus : std::int8_t {
   Accepted = 0,
   Relocated = 1,   ///< accepted after a run of refused ones: the target is somewhere else, or the clock was set
@@ -45,7 +45,7 @@ enum class SampleStatus : std::int8_t {
   Invalid = 4,     ///< refused: not finite, not a pose, or more than 10⁹ m away
 };
 
-/// How many samples had which fate.
+/// Number of samples with each status.
 struct SampleCounts {
   std::int64_t accepted = 0;      ///< relocated ones included
   std::int64_t relocated = 0;     ///< samples of SampleStatus::Relocated
@@ -54,7 +54,7 @@ struct SampleCounts {
   std::int64_t invalid = 0;       ///< samples of SampleStatus::Invalid
 };
 
-/// What a target is, ordered from the best to the worst.
+/// The state of the stream, ordered from the best to the worst.
 enum class StreamStatus : std::int8_t {
   Tracking = 0,  ///< as the samples say, or within the horizon of the last one
   Coasting = 1,  ///< longer without a sample than the horizon: coming to rest
@@ -67,37 +67,37 @@ const char* to_string(StreamStatus status) noexcept;
 /// "accepted", "relocated", "outlier", "out of order", "invalid".
 const char* to_string(SampleStatus status) noexcept;
 
-/// Where to be now, and how to move: `servo.update(target.pose, target.twist)`.
+/// Pose and twist for this cycle: `servo.update(target.pose, target.twist)`.
 struct Target {
   Pose pose = Pose::Identity();                 ///< tip in base
   Twist twist = Twist::Zero();                  ///< derivative of the pose: [v; ω], base axes, at its origin
-  StreamStatus status = StreamStatus::Waiting;  ///< what the target is made of
+  StreamStatus status = StreamStatus::Waiting;  ///< the state of the stream
   double age = 0.0;                             ///< [s] since the newest sample was taken; 0 before the first
 };
 
-/// The way from a sensor to a servo: samples come when they come, late, doubled, wrong or not at all; targets go out
-/// each cycle. They are continuous, with their twist, and never faster than max_speed and max_angular_speed: not when a
-/// sample arrives, not when the stream stops or starts again, not when the target is found elsewhere.
+/// The link from a sensor to a servo: samples come at any time, late, doubled, wrong or not at all; targets go out each
+/// cycle. Pose and twist of the targets are continuous and never faster than max_speed and max_angular_speed, also when
+/// a sample arrives, when the stream stops or starts again, or when the target is found elsewhere.
 ///
-///     stream.push(stamp, pose);                    // whenever there is one: stamp = when it was taken
+///     stream.push(stamp, pose);                    // for each sample; stamp: when the sample was taken
 ///     const Target target = stream.at(now);        // each cycle, on the same clock
 ///     servo.update(target.pose, target.twist);
 ///
-/// A sensor's delay needs no setting: Predict looks ahead from the stamp to now. Not to be shared between threads
-/// without a lock.
+/// A sensor's delay needs no setting: Predict looks ahead from the stamp to now. Threads that share one object need a
+/// lock.
 ///
-/// *Model.* The samples make a motion R(t): held, interpolated, or predicted. Interpolated is cubic between samples, in
-/// R³ and in the chart φ = log(R R_aᵀ) of the earlier one, with the slopes of the parabola through three neighbours.
-/// Predicted is an extended Kalman filter for p, v and R, ω with ṗ = v, Ṙ = [ω]× R, errors p = p̂ + e, R = exp(η) R̂
-/// (invariant under a change of base, Barrau and Bonnabel 2017), and an acceleration that is constant between samples.
-/// With noise that is alike in all directions, and to first order in the angle turned between samples, its covariances
-/// are 2×2 ⊗ I₃: one gain for place and one for velocity, linear and angular. After `horizon` without a sample, v and ω
-/// fade to rest by `timeout`.
+/// *Model.* The samples make a motion R(t): held, interpolated, or predicted. An interpolated motion is cubic between
+/// samples, in R³ and in the chart φ = log(R R_aᵀ) of the earlier sample, with the slopes of the parabola through three
+/// neighbours. A predicted motion comes from an extended Kalman filter for p, v and R, ω with ṗ = v, Ṙ = [ω]× R, errors
+/// p = p̂ + e, R = exp(η) R̂ (invariant under a change of base, Barrau and Bonnabel 2017), and an acceleration that is
+/// constant between samples. With isotropic noise, and to first order in the angle turned between samples, its
+/// covariances are 2×2 ⊗ I₃: one gain for position and one for velocity, linear and angular. After `horizon` without a
+/// sample, v and ω fade to rest by `timeout`.
 ///
-/// *Output.* The target is exp(d(t)) R(t), with the difference d from the motion decaying as d̈ = −2ḋ/τ − d/τ², τ the
-/// `smoothing`, from where it was, and as fast as it was, in the cycle before: so neither pose nor twist jump when a
-/// sample changes the motion. d is accelerated by the largest speed per τ at most, and steps beyond the largest speeds
-/// are shortened.
+/// *Output.* The target is exp(d(t)) R(t). The difference d from the motion decays as d̈ = −2ḋ/τ − d/τ², where τ is
+/// `smoothing`. When a sample changes the motion, d and ḋ start from the target of the cycle before, so neither pose
+/// nor twist jumps. The acceleration of d is at most the largest speed per τ, and steps beyond the largest speeds are
+/// shortened.
 class TargetStream {
  public:
   /// \throws Error where an option is out of its range
@@ -107,19 +107,19 @@ class TargetStream {
   void reset() noexcept;
 
   /// Forgets everything. The next target is at `start`, such as the tip's pose, and goes to the samples from there.
-  /// \throws Error where it is not a pose
+  /// \throws Error where `start` is not a pose
   void reset(const Pose& start);
 
-  /// A sample: when it was taken [s], and the pose then. Real time.
+  /// Adds a sample: the time [s] at which it was taken, and the pose at this time. Real time.
   SampleStatus push(double time, const Pose& pose) noexcept;
 
-  /// The target at a time [s] not before that of the last call; else, or where it is not finite, the last one again.
+  /// The target at `time` [s]. If `time` is before that of the last call, or not finite, the answer is the last target.
   /// Real time.
   Target at(double time) noexcept;
 
   /// The settings, as given.
   const TargetStreamOptions& options() const noexcept { return options_; }
-  /// What became of the samples since the last reset().
+  /// Counts of the samples since the last reset().
   const SampleCounts& counts() const noexcept { return counts_; }
 
  private:
@@ -131,7 +131,7 @@ class TargetStream {
     Pose pose = Pose::Identity();  ///< tip in base
     Twist twist = Twist::Zero();
   };
-  // Covariance of place and velocity; each entry stands for a multiple of I₃.
+  // Covariance of position and velocity; each entry stands for a multiple of I₃.
   struct Covariance {
     double place, cross, velocity;
   };

@@ -40,7 +40,7 @@ TaskVector select_rows(const Task& task, const Eigen::Matrix3d& rotation, const 
 /// Up to six twists, one a column.
 using TwistColumns = Eigen::Matrix<double, 6, Eigen::Dynamic, kLayout, 6, kMaxTask>;
 
-/// The twist, base axes, with these values in the rows of the task and zero in the others. Undoes select_rows.
+/// The twist, base axes, with these values in the rows of the task and zero in the others: the inverse of select_rows.
 Twist expand_rows(const Task& task, const Eigen::Matrix3d& rotation, const TaskVector& values) noexcept;
 
 SIGMAIK_SAME_LAYOUT(Task);

@@ -25,7 +25,7 @@ struct Solution {
   int singular_count() const noexcept;
 };
 
-/// Resolves twists at given Jacobians by one method. Keeps only the last decomposition, as a warm start.
+/// Resolves twists at given Jacobians by one method. A solver keeps only the last decomposition, as a warm start.
 class VelocitySolver {
  public:
   /// \param length_scale [m] > 0: 1 rad/s weighs as much as length_scale m/s. Singular values of a Jacobian that mixes
@@ -36,9 +36,9 @@ class VelocitySolver {
 
   /// Real time.
   ///
-  /// \param jacobian m×n, 1 ≤ m ≤ 6, 1 ≤ n ≤ 16. With six rows the task's mask and frame apply. With as many rows as
-  ///     the mask has, it is taken as masked already. Any other m needs a task that asks for everything; its rows
-  ///     from the fourth on then count as angular.
+  /// \param jacobian m×n, 1 ≤ m ≤ 6, 1 ≤ n ≤ 16. If J has six rows, the task's mask and frame apply. If J has as many
+  ///     rows as the mask, its rows count as masked already. Any other m needs a task that asks for all rows; rows from
+  ///     the fourth on then count as angular.
   /// \param twist (m,) [m/s, rad/s]
   /// \param posture (n,) q̇_posture [rad/s or m/s]; empty: none
   /// \param rotation tip in base; used where the task is in tool axes
@@ -62,7 +62,7 @@ class VelocitySolver {
   const Spectrum& spectrum() const noexcept { return spectrum_; }
 
  private:
-  // What solve() was asked, and how the task reads it.
+  // The arguments of solve(), and their meaning for the task.
   struct Question {
     const TaskJacobianRef& jacobian;
     const TaskRef& twist;

@@ -18,7 +18,7 @@ void require_radius(double radius) {
   require(std::isfinite(radius) && radius > 0.0, "radius = ", radius, " m must be finite and greater than 0");
 }
 
-// Into m equal pieces: with a sphere around each piece, between the spheres nothing sticks out.
+// Divides the cylinder into m equal pieces, with a sphere around each: the spheres cover the whole cylinder.
 void cover_cylinder(const LinkShape& shape, std::vector<LinkSphere>& spheres) {
   const double radius = shape.size[0], length = shape.size[1];
   const int m = static_cast<int>(std::clamp(std::ceil(length / radius), 1.0, 1.0 + kMaxSpheres));
@@ -29,7 +29,7 @@ void cover_cylinder(const LinkShape& shape, std::vector<LinkSphere>& spheres) {
   }
 }
 
-// Into boxes about as large as its smallest side, at most three along its longest.
+// Divides the box into boxes about as large as its smallest side, at most three along its longest side.
 void cover_box(const LinkShape& shape, std::vector<LinkSphere>& spheres) {
   const double side = std::max(shape.size.minCoeff(), shape.size.maxCoeff() / 3.0);
   const Eigen::Array3d count = (shape.size.array() / side - 1e-9).ceil().max(1.0), piece = shape.size.array() / count;
@@ -44,7 +44,8 @@ void cover_box(const LinkShape& shape, std::vector<LinkSphere>& spheres) {
   }
 }
 
-// From a link's frame to the next one's, whose spheres begin there; the tip has a sphere of its own.
+// Covers a link from its frame to the next link's frame, where the next link's spheres begin; the tip has a single
+// sphere.
 void cover_link(const Chain& chain, int segment, double radius, std::vector<LinkSphere>& spheres) {
   const std::vector<Segment>& segments = chain.segments();
   const std::size_t next = static_cast<std::size_t>(segment + 1);
@@ -58,7 +59,7 @@ void cover_link(const Chain& chain, int segment, double radius, std::vector<Link
   for (int k = 0; k < m; ++k) spheres.push_back({segment, way * (static_cast<double>(k) / m), radius});
 }
 
-// Without those that lie in another of the same link.
+// The spheres without those that lie in another sphere of the same link.
 std::vector<LinkSphere> without_inner(const std::vector<LinkSphere>& spheres) {
   std::vector<LinkSphere> kept;
   for (std::size_t i = 0; i < spheres.size(); ++i) {
@@ -91,10 +92,10 @@ ArmSpheres::ArmSpheres(const Chain& chain, std::vector<LinkSphere> spheres)
             " m must be finite and greater than 0");
   }
 
-  // At q = 0 links' frames are products of origins, and joints' frames of the constants: what lies between the two
-  // stays.
+  // At q = 0 the links' frames are products of the origins, and the joints' frames are products of the constants: the
+  // transform between the two does not depend on q.
   std::vector<Pose> to_joint{Pose::Identity()};  // of the base, then of each segment
-  std::vector<int> moved{0};                     // by how many joints
+  std::vector<int> moved{0};                     // number of joints that move each
   Pose link = Pose::Identity(), joint = Pose::Identity();
   for (const Segment& s : segments) {
     link = link * s.origin;

@@ -19,7 +19,7 @@ using sigmaik::detail::require;
 
 using sigmaik::detail::kInfinity;
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr double kLongest = 1e6;  // times the duration, where limits of acceleration are too tight
+constexpr double kLongest = 1e6;  // times the duration: the search for a duration with a law ends here
 
 double top_speed(const CartLaw& law, double dt) {
   double top = 0.0;
@@ -29,7 +29,7 @@ double top_speed(const CartLaw& law, double dt) {
   return top / dt;
 }
 
-// Between samples; from and to rest too, where asked for.
+// The largest acceleration between samples; with at_rest, also at the start from rest and at the stop.
 double top_acceleration(const std::vector<double>& x, double dt, bool at_rest) {
   const std::size_t m = x.size();
   double top = at_rest ? std::max(std::abs(x[1] - x[0]), std::abs(x[m - 1] - x[m - 2])) : 0.0;
@@ -37,8 +37,8 @@ double top_acceleration(const std::vector<double>& x, double dt, bool at_rest) {
   return top / (dt * dt);
 }
 
-// The law of the least energy on the sides of `law`, within speed and acceleration [m per sample, m per sample²]. False
-// where there is none.
+// The law of the least energy on the sides of `law`, within speed and acceleration [m per sample, m per sample²].
+// Returns false if no such law exists.
 bool accelerate(const PlanarPath& path, double r, const CartOptions& options, double speed, double acceleration,
                 CartLaw& law) {
   const detail::Grid grid = detail::make_grid(path, r);
@@ -79,7 +79,7 @@ bool accelerate(const PlanarPath& path, double r, const CartOptions& options, do
   return true;
 }
 
-// Which limit it is that leaves no way: the first one without which there is one.
+// Finds the limit that excludes every motion: the first limit without which there is a motion.
 void explain(const PlanarPath& path, double start, double end, double r, const CartOptions& options,
              detail::Outcome& out) {
   CartOptions o = options;
@@ -117,7 +117,7 @@ void explain(const PlanarPath& path, double start, double end, double r, const C
   if (!without.fault) out.facts += message("; the shortest turns it by ", without.law.turn, " rad");
 }
 
-// The largest radius with a law: a smaller circle forbids less. NaN where a thousand millionth of it is still too much.
+// The largest radius with a law: a smaller circle forbids less. NaN if 1e-9 of the radius is still too much.
 double feasible_radius(const PlanarPath& path, double start, double end, double radius, const CartOptions& options) {
   const auto feasible = [&](double r) {
     return !detail::best_sides(path, start, end, r + options.margin, options).fault;
@@ -172,7 +172,7 @@ CartLaw cart_law(const PlanarPath& path, double start, double end, double radius
   detail::Outcome out = detail::best_sides(path, start, end, r, options);
   if (!out.fault) {
     if (top_acceleration(out.law.x, dt, options.at_rest) <= options.max_acceleration) return std::move(out.law);
-    // A longer duration only makes limits, counted in samples, wider.
+    // A longer duration only widens the limits per sample.
     const auto within = [&](double longer) {
       constexpr double kInside = 1.0 - 1e-9;
       const double step = longer * dt;

@@ -10,7 +10,7 @@ namespace {
 
 using sigmaik::detail::kInfinity;
 constexpr double kPi = 3.14159265358979323846;
-constexpr double kNear = 1e-6;  // [samples] a tip keeps away from the samples beside it
+constexpr double kNear = 1e-6;  // [samples] least distance of a tip from the samples beside it
 constexpr int kLeap = 16;       // points inside a region that lies between two samples
 
 }  // namespace
@@ -38,7 +38,7 @@ Grid make_grid(const PlanarPath& path, double r) {
     const bool from_right = g.points[static_cast<std::size_t>(e.first)].py < 0.0;
     e.winding = (py < 0.0) == from_right ? 0 : from_right ? -1 : 1;
   };
-  // The point of the step from sample i where y has this value.
+  // Adds the point of the step from sample i at which y has this value.
   const auto add_between = [&](int i, double y, double h) {
     const double f = std::clamp((y - path(i, 1)) / (path(i + 1, 1) - path(i, 1)), kNear, 1.0 - kNear);
     add(i + f, path(i, 0) + f * (path(i + 1, 0) - path(i, 0)), path(i, 1) + f * (path(i + 1, 1) - path(i, 1)), h);

@@ -15,9 +15,9 @@ namespace {
 using detail::evenly;
 using sigmaik::detail::require;
 
-constexpr double kTolerance = 1e-12;  // of lengths, relative to them: what counts as on the border, not inside
+constexpr double kTolerance = 1e-12;  // relative to lengths: a point within this tolerance is on the border, not inside
 
-// Σ of `count` terms by halves, whose rounding error grows with log(count) only.
+// Σ of `count` terms by halves: the rounding error grows with log(count) only.
 template <typename Term>
 double sum(std::size_t first, std::size_t count, const Term& term) {
   if (count > 128) {
@@ -46,7 +46,7 @@ class Line {
   const std::vector<double>&at_, &value_;
 };
 
-struct Seen {  // the point from the first joint's axis
+struct Seen {  // the point, seen from the first joint's axis
   std::vector<double> x, y;
 };
 
@@ -83,7 +83,7 @@ bool finite(const std::vector<double>& values) {
 
 void require_times(const std::vector<double>& times) { require(finite(times), "t must be finite"); }
 
-// All but the measures of the point.
+// A motion with everything but the measures of the point.
 template <typename Motion>
 Motion begin(const PlanarPath& path, double radius, double margin, double duration) {
   check(path, radius, margin, duration);
@@ -245,7 +245,7 @@ std::vector<double> admissible_guess(const PlanarPath& path, double start, doubl
   if (known.empty()) return guess;
   if (std::isfinite(options.upper)) top = options.upper;
   if (std::isfinite(options.lower)) bottom = options.lower;
-  // Free samples stay where the next part of the region wants the cart.
+  // Free samples take the position that the next part of the region needs.
   for (std::size_t i = 1, next = 0; i + 1 < m; ++i) {
     while (next + 1 < known.size() && known[next] < i) ++next;
     guess[i] = law.x[known[next]] >= law.upper[known[next]] ? top : bottom;

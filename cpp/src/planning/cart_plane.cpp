@@ -23,9 +23,9 @@ using sigmaik::detail::message;
 using sigmaik::detail::require;
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr int kNearer = 5;        // programs towards a way within limits of a longer duration
-constexpr int kTightenings = 10;  // such durations
-constexpr double kLongest = 1e6;  // times the duration, where limits are too tight
+constexpr int kNearer = 5;        // programs for the limits of one longer duration
+constexpr int kTightenings = 10;  // longer durations that are tried
+constexpr double kLongest = 1e6;  // times the duration: the search for a duration with a motion ends here
 
 // Whether speed and acceleration [per sample] are within limits.
 bool keeps(const PlanarPath& c, const Limits& limits, bool at_rest) {
@@ -101,7 +101,7 @@ void check_samples(const PlanarPath& path, const detail::PlaneSearch& planner) {
   }
 }
 
-// The best way without limits of speed and acceleration.
+// The best motion without limits of speed and acceleration.
 PlanarPath free_way(detail::PlaneSearch& planner, const PlaneCartOptions& options) {
   PlanarPath c;
   if (planner.search(c)) return c;
@@ -120,11 +120,11 @@ Limits limits_of(const PlaneCartOptions& options, Eigen::Index samples, double l
   return {dt * detail::pair(options.max_speed), dt * dt * detail::pair(options.max_acceleration)};
 }
 
-// A way within the limits of speed and acceleration, from the best way without them.
+// A motion within the limits of speed and acceleration, found from the best motion without them.
 PlanarPath limited_way(detail::PlaneSearch& planner, const PlanarPath& path, const PlanarPath& best,
                        const PlaneCartOptions& options) {
   PlanarPath c = best;
-  // Into c: within the limits of a duration so many times as long, by way of `from`.
+  // Sets c to a motion within the limits of a duration that is `longer` times as long, starting from the motion `from`.
   const auto within = [&](double longer, const PlanarPath& from, int programs) {
     c = from;
     Limits inside = limits_of(options, path.rows(), longer);
@@ -134,7 +134,8 @@ PlanarPath limited_way(detail::PlaneSearch& planner, const PlanarPath& path, con
   };
   PlanarPath way = best;
   if (within(1.0, way, kPrograms)) return c;
-  // The half-planes of a way that takes its limits into account leave more room: down to them from a longer duration.
+  // The half-planes of a motion that takes limits into account leave more room, so a motion for a longer duration leads
+  // to one within the limits.
   double good = 2.0, bad = 1.0;
   while (good < kLongest && !within(good, way, kNearer)) {
     bad = good;

@@ -19,7 +19,7 @@ using sigmaik::detail::message;
 using sigmaik::detail::kInfinity;
 constexpr double kPi = 3.14159265358979323846;
 
-// The best sides by branch and bound: a node has some regions' sides fixed and leaves out the others.
+// The best sides by branch and bound: a node fixes the sides of some regions and leaves out the other regions.
 class Search {
  public:
   Search(const PlanarPath& path, double start, double end, double r, const CartOptions& options)
@@ -59,7 +59,7 @@ class Search {
         push(open, std::move(child));
       }
     }
-    out.fault = CartFault::Winding;  // or speed: the caller tells them apart
+    out.fault = CartFault::Winding;  // or Speed: the caller distinguishes the two
     return out;
   }
 
@@ -75,7 +75,7 @@ class Search {
     return side > 0 ? e.high <= options_.upper : e.low >= options_.lower;
   }
 
-  // Sides that the ends decide. False, with the fault, where they cannot be.
+  // Fixes the sides that the ends or the range decide. Returns false, with the fault, if no side is possible.
   bool fix_sides(std::vector<signed char>& sides, Outcome& out) {
     const int n = static_cast<int>(grid_.at.size());
     const GridPoint &head = grid_.points.front(), &tail = grid_.points.back();
@@ -119,7 +119,7 @@ class Search {
     return true;
   }
 
-  // The taut string for these sides into x_, corners_.
+  // Draws the taut string for these sides into x_ and corners_.
   void draw(const std::vector<signed char>& sides) {
     const std::size_t n = grid_.at.size();
     low_.assign(n, options_.lower);
@@ -141,7 +141,7 @@ class Search {
     ++strings_;
   }
 
-  // Draws the string, and keeps it where it can lead to a law.
+  // Draws the string, and adds a node if the string can lead to a law.
   void push(std::priority_queue<Node>& open, std::vector<signed char> sides) {
     if (options_.turn && !can_turn(sides)) return;
     draw(sides);
@@ -152,7 +152,7 @@ class Search {
       if (std::abs(rise) > top_slope_ * length * (1.0 + 1e-12)) return;
       node.energy += rise * rise / length;
     }
-    // The region that the string is deepest in.
+    // Branch on the region in which the string is deepest.
     double deepest = 0.0;
     for (std::size_t j = 0; j < sides.size(); ++j) {
       if (sides[j] != 0) continue;
@@ -167,16 +167,16 @@ class Search {
     open.push(std::move(node));
   }
 
-  // Side of a part of the region that the string passes.
+  // The side on which the string passes a part of the region.
   int passes(std::size_t j) const {
     const Extent& e = grid_.extents[j];
     auto k = static_cast<std::size_t>(e.first + (e.last - e.first) / 2);
-    if (grid_.points[k].lower == grid_.points[k].upper) k = static_cast<std::size_t>(e.last);  // a tip tells no side
+    if (grid_.points[k].lower == grid_.points[k].upper) k = static_cast<std::size_t>(e.last);  // a tip has no sides
     return x_[k] > grid_.points[k].px ? 1 : -1;
   }
 
-  // Whether the sides still open leave room for the turn asked for. P's azimuth goes over the half-line of π where the
-  // cart passes above a part in which y changes its sign, and nowhere else.
+  // Whether the sides that are still open allow the turn asked for. P's azimuth crosses π where the cart passes above a
+  // part of the region in which y changes its sign, and nowhere else.
   bool can_turn(const std::vector<signed char>& sides) const {
     int least = 0, most = 0;
     for (std::size_t j = 0; j < sides.size(); ++j) {
@@ -187,8 +187,8 @@ class Search {
     return least <= turns_ && turns_ <= most;
   }
 
-  // The part to branch on where the string is in none, but does not turn as asked: that with the least way to its other
-  // side.
+  // The part to branch on if the string is in no part, but does not turn as asked: the part whose other side is nearest
+  // to the string.
   int to_turn(const std::vector<signed char>& sides) const {
     int missing = turns_, nearest = -1;
     for (std::size_t j = 0; j < sides.size(); ++j) missing -= passes(j) > 0 ? grid_.extents[j].winding : 0;
@@ -209,7 +209,7 @@ class Search {
     return nearest;
   }
 
-  // [m] by which the string would have to be moved to be on one side of a region altogether; 0 where it is.
+  // Distance [m] by which the string would have to move to be completely on one side of a region; 0 if it is.
   double depth_in(const Extent& e) const {
     double above = 0.0, under = 0.0;
     for (auto k = static_cast<std::size_t>(e.first); k <= static_cast<std::size_t>(e.last); ++k) {
@@ -219,13 +219,13 @@ class Search {
     return std::min(above, under);
   }
 
-  // [rad] from P's azimuth at the start to that at the end, both in (−π, π].
+  // Turn [rad] from P's azimuth at the start to the azimuth at the end, both in (−π, π].
   double ends_turn() const {
     const auto azimuth = [](const GridPoint& p, double x) { return std::atan2(p.py + 0.0, p.px - x); };
     return azimuth(grid_.points.back(), end_) - azimuth(grid_.points.front(), start_);
   }
 
-  // [rad] of P's azimuth along x_: its ends, and how often it goes over the half-line of π.
+  // Turn [rad] of P's azimuth along x_: from its ends, and from the number of times that it crosses π.
   double turn() const {
     int turns = 0;
     const std::size_t n = x_.size();
@@ -238,7 +238,7 @@ class Search {
     return ends_turn() + 2.0 * kPi * turns;
   }
 
-  // The law of the string last drawn.
+  // Writes the law of the last string drawn.
   void finish(CartLaw& law) const {
     const auto m = static_cast<std::size_t>(grid_.at.back()) + 1;
     law.x.resize(m);
@@ -251,7 +251,7 @@ class Search {
       law.lower[at] = grid_.points[k].lower;
       law.upper[at] = grid_.points[k].upper;
     }
-    // The string bends at its corners alone.
+    // The string bends only at its corners: all other multipliers are zero.
     law.multipliers.assign(m, 0.0);
     law.corners.reserve(corners_.size());
     law.corner_x.reserve(corners_.size());
@@ -281,11 +281,11 @@ class Search {
   double start_, end_, r_;
   const CartOptions& options_;
   double top_slope_;  // [m per sample]
-  int turns_ = 0;     // asked for, of P's azimuth over the half-line of π
+  int turns_ = 0;     // asked for: how often P's azimuth crosses π
   std::vector<double> low_, high_, x_;
   std::vector<int> corners_;
   Funnel funnel_;
-  std::vector<signed char> drawn_;  // of the string in x_
+  std::vector<signed char> drawn_;  // sides of the string in x_
   int strings_ = 0;
 };
 

@@ -16,7 +16,7 @@ namespace {
 using detail::joints;
 using sigmaik::detail::require;
 
-// Crossings of a wall. Of an odd number one is unavoidable; which of them is arbitrary, and the first one is taken.
+// Adds the crossings of a wall. If their number is odd, one is unavoidable: which one is arbitrary, the first is taken.
 void add_wall(const std::string& name, const std::vector<double>& t, const std::vector<double>& q,
               const std::vector<double>& r, std::vector<Crossing>& out) {
   const std::size_t n = q.size() / t.size();
@@ -34,7 +34,7 @@ void add_wall(const std::string& name, const std::vector<double>& t, const std::
   }
 }
 
-// Passages through the tube ψ < within about a set of higher codimension, but for those that hold an end.
+// Adds the passages through the tube ψ < within about a set of higher codimension, except passages that contain an end.
 void add_tube(const std::string& name, const std::vector<double>& t, const std::vector<double>& q,
               const std::vector<double>& psi, double within, std::vector<Crossing>& out) {
   const std::size_t n = q.size() / t.size(), count = t.size();

@@ -31,8 +31,9 @@ Hinge hinge(double distance, double clearance) noexcept {
   return {missing - 0.5 * clearance, -1.0, 1.0 / missing};
 }
 
-// A slope in the place of each sphere, gathered into one in q. Σ_i f_iᵀ ∂c_i/∂q_k = z_kᵀ Σ_i (c_i − p_k) × f_i, over
-// the spheres i that joint k moves, is z_kᵀ(M − p_k × F) with running sums F = Σ f_i and M = Σ c_i × f_i from the tip.
+// Gathers slopes with respect to the spheres' centres into a gradient in q. Σ_i f_iᵀ ∂c_i/∂q_k = z_kᵀ Σ_i (c_i − p_k) ×
+// f_i, over the spheres i that joint k moves, is z_kᵀ(M − p_k × F) with running sums F = Σ f_i and M = Σ c_i × f_i from
+// the tip.
 class Gathered {
  public:
   explicit Gathered(const ArmSpheres& spheres) noexcept : spheres_(spheres) {
@@ -196,13 +197,13 @@ class SelfCollisionCost final : public SphereCost {
       const double square = slope.squaredNorm(), reach = pair.radii + clearance_;
       if (!(square < reach * reach)) continue;
       const double length = std::sqrt(square);
-      if (length > 0.0) slope /= length;  // else it is zero: no way out is better than another
+      if (length > 0.0) slope /= length;  // else the slope is zero: no direction out is better than another
       const Hinge h = hinge(length - pair.radii, clearance_);
       sum += h.value;
       gathered.add(pair.far, state, weight_ * h.slope * slope);
       gathered.add(pair.near, state, -weight_ * h.slope * slope);
       if (hessian == nullptr) continue;
-      // Joints that move both do not change their distance.
+      // Joints that move both spheres do not change their distance.
       spheres_.row(pair.far, state, slope, row);
       add_square(row, weight_ * h.curvature, spheres_.joints(pair.near), spheres_.joints(pair.far), *hessian);
     }

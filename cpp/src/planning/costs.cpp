@@ -44,7 +44,7 @@ class PotentialCost final : public JointCost {
   Potential potential_;
 };
 
-// From m with its derivatives to weight/(m + ε) with its own.
+// Turns m and its derivatives into weight/(m + ε) and its derivatives.
 class InverseCost : public JointCost {
  public:
   InverseCost(double weight, double epsilon) : weight_(weight), epsilon_(epsilon) {
@@ -132,7 +132,7 @@ class GenericCost final : public InverseCost {
   IndexFunction index_;
 };
 
-// weight · f(index), by value and slope of f.
+// weight · f(index), where derived classes give the value and the slope of f.
 class IndexCost : public JointCost {
  public:
   IndexCost(const Chain& chain, const IndexFunction& index, double weight)

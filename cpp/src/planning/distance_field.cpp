@@ -41,7 +41,7 @@ DistanceField::Corner DistanceField::locate(const Eigen::Vector3d& point) const 
   std::array<std::ptrdiff_t, 3> index;
   for (int axis = 0; axis < 3; ++axis) {
     const double cells = (point[axis] - origin_[axis]) * inverse_cell_;
-    const double inside = cells > 0.0 ? std::min(cells, last_[axis]) : 0.0;  // NaN too: its cell exists
+    const double inside = cells > 0.0 ? std::min(cells, last_[axis]) : 0.0;  // NaN becomes 0: its cell exists
     const int first = std::min(static_cast<int>(inside), shape_[static_cast<std::size_t>(axis)] - 2);
     index[static_cast<std::size_t>(axis)] = first;
     corner.fraction[axis] = inside - first;
@@ -82,7 +82,7 @@ double DistanceField::distance(const Eigen::Vector3d& point, Eigen::Vector3d& gr
   const double way = c.beyond.squaredNorm();
   if (way == 0.0) return inside;
   for (int axis = 0; axis < 3; ++axis) {
-    if (c.beyond[axis] != 0.0) gradient[axis] = 0.0;  // the nearest point of the box stays
+    if (c.beyond[axis] != 0.0) gradient[axis] = 0.0;  // the nearest point of the box does not move
   }
   if (inside > 0.0) {
     const double distance = std::sqrt(inside * inside + way);

@@ -11,7 +11,8 @@
 
 namespace sigmaik::planning {
 
-// Tridiagonal: v_{i−1} + 4 v_i + v_{i+1} = 3 (q_{i+1} − q_{i−1})/h, and 2 v_0 + v_1 = 3 (q_1 − q_0)/h at the ends.
+// A tridiagonal system: v_{i−1} + 4 v_i + v_{i+1} = 3 (q_{i+1} − q_{i−1})/h, and 2 v_0 + v_1 = 3 (q_1 − q_0)/h at the
+// ends.
 std::vector<double> spline_velocities(const std::vector<double>& q, int states, int dof) {
   sigmaik::detail::require(states >= 2 && dof >= 1 && q.size() == static_cast<std::size_t>(states * dof),
                            "the motion has ", q.size(), " numbers, needs ", states, " × ", dof);
@@ -40,7 +41,7 @@ std::vector<double> spline_velocities(const std::vector<double>& q, int states, 
 namespace detail {
 namespace {
 
-// Where a s² + b s + c has a root, or −b/(2a): s if it is within the step, else 0.
+// s is a root of a s² + b s + c, or −b/(2a); the answer is s if s is within the step, else 0.
 double inside(double s) { return s > 0.0 && s < 1.0 ? s : 0.0; }
 
 }  // namespace
@@ -52,7 +53,7 @@ NaturalSpline::NaturalSpline(std::vector<double> q, int states, int dof)
       q_(std::move(q)),
       qdot_(spline_velocities(q_, states, dof)),
       qddot_(q_.size()) {
-  // In a step from q0 to q1: q̈0 = (6 (q1 − q0)/h − 4 q̇0 − 2 q̇1)/h. Both ends have none.
+  // In a step from q0 to q1: q̈0 = (6 (q1 − q0)/h − 4 q̇0 − 2 q̇1)/h. At both ends q̈ is zero.
   const auto n = static_cast<std::size_t>(dof);
   for (std::size_t i = n; i + n < q_.size(); ++i) {
     qddot_[i] = (6.0 * (q_[i + n] - q_[i]) / h_ - 4.0 * qdot_[i] - 2.0 * qdot_[i + n]) / h_;

@@ -19,15 +19,15 @@ namespace sigmaik::planning::detail {
 
 using sigmaik::detail::kInfinity;
 constexpr double kPi = 3.14159265358979323846;
-constexpr int kCoarse = 121;         // samples where starts are compared
-constexpr int kCoarsePrograms = 30;  // quadratic programs of a start there
-constexpr int kPrograms = 300;       // of the best one on all samples
-constexpr int kAzimuths = 32;        // places on the disc's border that dynamic programming goes through
+constexpr int kCoarse = 121;         // samples of the coarse grid, on which starts are compared
+constexpr int kCoarsePrograms = 30;  // quadratic programs of a start on the coarse grid
+constexpr int kPrograms = 300;       // quadratic programs of the best start on all samples
+constexpr int kAzimuths = 32;        // places on the disc's border for dynamic programming
 constexpr int kSheetsAside = 3;      // turns that dynamic programming counts either way
 constexpr double kLeap = 0.9;        // of the radius: a step that comes nearer leaps over the disc
-constexpr double kSettled = 1e-9;    // of the radius, by which the last program moved the cart
-constexpr double kTight = 1e-9;      // of the radius: what counts as on the border
-constexpr double kCopy = 1e-4;       // [rad] between tangents of the outer disc
+constexpr double kSettled = 1e-9;    // of the radius: a program that moves the cart less is the last
+constexpr double kTight = 1e-9;      // of the radius: tolerance of being on the border
+constexpr double kCopy = 1e-4;       // [rad] tangents of the outer disc closer than this are copies
 
 inline Vector2d pair(const AxisPair& values) { return {values[0], values[1]}; }
 
@@ -54,8 +54,8 @@ class PlaneSearch {
            (c.array() >= lower_.array() - slack).all() && (c.array() <= upper_.array() + slack).all();
   }
 
-  // Places that come into question for `wanted`. Where any place is allowed, one of these is: what is allowed has a
-  // corner of the range, a crossing of an edge and a circle, or all of a circle.
+  // Candidates for the allowed place nearest to `wanted`. If any place is allowed, one of the candidates is allowed,
+  // because the allowed places contain a corner of the range, a crossing of an edge and a circle, or a whole circle.
   std::vector<Vector2d> places(const Vector2d& f, const Vector2d& wanted) const {
     std::vector<Vector2d> out;
     const Vector2d &low = lower_, &high = upper_;
@@ -89,7 +89,7 @@ class PlaneSearch {
     return out;
   }
 
-  // The place nearest to c. False where none is allowed.
+  // Moves c to the nearest candidate. Returns false if no place is allowed.
   bool put(const Vector2d& f, Vector2d& c) const {
     const Vector2d wanted = c;
     double nearest = kInfinity;
@@ -109,12 +109,12 @@ class PlaneSearch {
     return true;
   }
 
-  // The exact laws of one axis, where the other can stand.
+  // Adds the exact laws of one axis as guesses, where the other axis can stand.
   void along_one_axis(const PlanarPath& f, std::vector<PlanarPath>& guesses) const {
     for (const int axis : {0, 1}) {
       const int other = 1 - axis;
       if (pinned(axis) || start_[other] != end_[other]) continue;
-      // Seen with x along the axis, y to its left.
+      // The frame of cart_law(): x along the axis, y to the left of the axis.
       const double sign = axis == 0 ? 1.0 : -1.0;
       PlanarPath path(f.rows(), 2);
       path.col(0) = f.col(axis);
@@ -127,13 +127,13 @@ class PlaneSearch {
         c.col(axis) = Eigen::Map<const Eigen::VectorXd>(law.x.data(), f.rows());
         c.col(other).setConstant(start_[other]);
         guesses.push_back(std::move(c));
-      } catch (const CartError&) {  // then it is no guess
+      } catch (const CartError&) {  // this axis gives no guess
       }
     }
   }
 
-  // Dynamic programming over places where each sample could be: the way of the least energy that leaps over no disc,
-  // for each number of turns.
+  // Dynamic programming over candidate places of each sample: for each number of turns, the motion of the least energy
+  // that does not leap over the disc.
   std::vector<PlanarPath> walked(const PlanarPath& f, const std::vector<PlanarPath>& guesses) const {
     const auto m = static_cast<std::size_t>(f.rows());
     std::vector<std::vector<Vector2d>> at(m);
@@ -150,12 +150,12 @@ class PlaneSearch {
         const Vector2d place = here + polar(r_, 2.0 * kPi * k / kAzimuths);
         if (allowed(place, here)) at[i].push_back(place);
       }
-      // Guesses often agree.
+      // Guesses often agree, so duplicates are removed.
       std::sort(at[i].begin(), at[i].end(),
                 [](const Vector2d& a, const Vector2d& b) { return a.x() != b.x() ? a.x() < b.x() : a.y() < b.y(); });
       at[i].erase(std::unique(at[i].begin(), at[i].end()), at[i].end());
     }
-    // Turns are counted where the azimuth goes over the half-line of π.
+    // A turn is counted where the azimuth crosses π.
     struct State {
       double energy = kInfinity;
       std::size_t from = 0;
@@ -195,7 +195,8 @@ class PlaneSearch {
     return out;
   }
 
-  // Programs one after the other from c, whose normals are the first to be used. False where a program has no answer.
+  // Solves one program after the other; the first takes its normals from c. Returns false if no program leads to an
+  // answer.
   bool improve(const PlanarPath& f, PlanarPath& c, int programs, double settled, const Limits& limits = {}) {
     const auto m = static_cast<int>(c.rows());
     std::vector<BandRow> fixed, rows, cuts;
@@ -228,7 +229,7 @@ class PlaneSearch {
         const Vector2d n = distance > 0.0 ? Vector2d(d / distance) : Vector2d(1.0, 0.0);
         const double offset = n.dot(f.row(i).transpose() - start_);
         rows.push_back({2 * i, 2, {n.x(), n.y(), 0.0}, r_ + offset, kInfinity});
-        // Tangents hold the outer disc in from outside: those that were needed stay, but for near copies.
+        // Tangents bound the outer disc from outside: tangents of earlier programs stay, except near copies.
         if (distance > options_.max_radius * (1.0 - kTight)) {
           const BandRow cut{2 * i, 2, {n.x(), n.y(), 0.0}, -kInfinity, options_.max_radius + offset};
           std::size_t& last = last_cut[static_cast<std::size_t>(i)];
@@ -244,7 +245,7 @@ class PlaneSearch {
       Eigen::Map<PlanarPath> moved(x.data(), m, 2);
       moved = c.rowwise() - start_.transpose();
       ++programs_;
-      // Once one is solved its answer keeps everything, and all that is lost is the rest of the way down.
+      // The answer of an earlier program keeps all constraints; only the remaining decrease of the energy is lost.
       if (!BandQp<2>(rows, {pinned(0), pinned(1)}).solve(x)) return k > 0 && reaches(f, c);
       moved.rowwise() += start_.transpose();
       const double step = (moved - c).cwiseAbs().maxCoeff();
@@ -256,7 +257,7 @@ class PlaneSearch {
     return true;
   }
 
-  // The best of all starts on a coarse grid, or on all samples where there are few.
+  // Finds the best of all starts on a coarse grid (on all samples if there are few), and refines it on all samples.
   bool search(PlanarPath& best) {
     const int m = std::min(static_cast<int>(f_.rows()), kCoarse);
     const PlanarPath f = m == f_.rows() ? f_ : resampled(f_, m);
@@ -288,7 +289,7 @@ class PlaneSearch {
       }
     }
     if (least == kInfinity) return false;
-    // Onto all samples in polar coordinates, which keep out of the disc between samples.
+    // Interpolation in polar coordinates keeps out of the disc between samples.
     const PlanarPath d = best - f;
     const auto last = f_.rows() - 1;
     if (m <= last) {
@@ -311,7 +312,7 @@ class PlaneSearch {
     return !options_.turn || std::abs(turn_of(d) - *options_.turn) <= kPi * (1.0 + 1e-9);
   }
 
-  // Whether a step leaps over the disc, which fewer samples allow; remembered, to tell.
+  // Whether a step leaps over the disc, which a coarse grid allows. leapt_ remembers a leap for the text of an error.
   bool leap(const PlanarPath& d) {
     for (Eigen::Index i = 0; i + 1 < d.rows(); ++i) {
       if (step_distance(d.row(i), d.row(i + 1)) < kLeap * r_) return leapt_ = true;

@@ -16,10 +16,10 @@ inline double cross(const Vector2d& a, const Vector2d& b) { return a.x() * b.y()
 inline double turn_between(const Vector2d& a, const Vector2d& b) { return std::atan2(cross(a, b), a.dot(b)); }
 inline Vector2d polar(double length, double angle) { return {length * std::cos(angle), length * std::sin(angle)}; }
 
-/// The path at so many samples, by linear interpolation.
+/// The path at `samples` samples, by linear interpolation.
 PlanarPath resampled(const PlanarPath& path, int samples);
 
-/// [rad] by which the azimuth turns along d.
+/// Turn [rad] of the azimuth along d.
 double turn_of(const PlanarPath& d);
 
 /// The least distance from the origin of a step from a to b.
@@ -31,8 +31,8 @@ double energy_of(const PlanarPath& c);
 /// Tangent, arc, tangent round a disc of radius r from a to b, turning by `turn`, at constant speed.
 PlanarPath shortest(const Vector2d& a, const Vector2d& b, double turn, double r, int samples);
 
-/// The straight motion, and as many variants as it has ways round the disc: where it is within the radius its azimuth
-/// goes evenly from that before to that after, on either side.
+/// The straight motion, in a variant for each way round the disc: where the motion is within the radius, its azimuth
+/// goes evenly from the sample before to the sample after, on either side.
 std::vector<PlanarPath> forked(const PlanarPath& straight, double r);
 
 }  // namespace sigmaik::planning::detail

@@ -16,7 +16,7 @@ namespace {
 using detail::joints;
 using sigmaik::detail::require;
 
-// Six significant digits: as many as tell a person where an arm stands.
+// Six significant digits are enough to tell a reader where an arm stands.
 std::string short_number(double value) {
   char out[32];
   std::snprintf(out, sizeof out, "%.6g", value);

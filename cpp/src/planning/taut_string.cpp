@@ -14,7 +14,7 @@ namespace {
 
 using sigmaik::detail::kInfinity;
 
-// b is below the line from a to c; mirrored for kSign −1.
+// Whether b is below the line from a to c; for kSign −1, above it.
 template <int kSign, typename Point>
 bool below(const Point& a, const Point& b, const Point& c) {
   return kSign * ((c.x - b.x) * (b.t - a.t) - (b.x - a.x) * (c.t - b.t)) > 0.0;

@@ -31,14 +31,14 @@ std::string text(double value) {
   return {buffer, end};
 }
 
-// The whole of `word` as a number.
+// Reads `word`, which must be a number as a whole.
 template <typename Number>
 bool read(std::string_view word, Number& out) {
   const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), out);
   return error == std::errc() && end == word.data() + word.size();
 }
 
-// One line of comma-separated numbers, appended to `out`. False where one is not a number.
+// Appends a line of comma-separated numbers to `out`. Returns false if one of them is not a number.
 bool read_row(std::string_view line, std::vector<double>& out) {
   while (true) {
     const std::size_t comma = line.find(',');
@@ -48,7 +48,7 @@ bool read_row(std::string_view line, std::vector<double>& out) {
   }
 }
 
-// A line "# name value" of the head. False where the value is not one.
+// Reads a line "# name value" of the head. Returns false if the value is not valid.
 bool read_fact(const std::string& name, const std::string& value, Trajectory& plan) {
   int cubic = 0;
   if (name == "status") return plan.status = plan_status(value), true;
@@ -59,7 +59,7 @@ bool read_fact(const std::string& name, const std::string& value, Trajectory& pl
   if (name == "iterations") return read(value, plan.iterations);
   if (name == "starts") return read(value, plan.starts);
   if (name == "cubic") return read(value, cubic) && (plan.cubic = cubic != 0, true);
-  return true;  // of a later version
+  return true;  // a later version wrote this line
 }
 
 }  // namespace
@@ -149,7 +149,7 @@ void Trajectory::save(const std::string& file) const {
     }
     out << '\n';
   }
-  // Written beside its place and moved there, so that nobody ever sees half of it.
+  // The file is written beside its place and then moved there, so that no reader sees half of the file.
   const std::string beside = file + ".part";
   {
     std::ofstream stream(beside, std::ios::binary | std::ios::trunc);

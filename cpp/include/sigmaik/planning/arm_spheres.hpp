@@ -1,6 +1,6 @@
 #pragma once
 /// \file arm_spheres.hpp
-/// An arm as spheres along its links: what collision costs are made of.
+/// An arm as spheres along its links, for collision costs.
 
 #include <array>
 #include <string>
@@ -21,7 +21,7 @@ struct LinkSphere {
   double radius = 0.0;                               ///< [m] > 0
 };
 
-/// Scratch and result of ArmSpheres::update(). One a thread; no heap.
+/// Memory and result of ArmSpheres::update(), one object for each thread; no heap.
 struct SphereState {
   std::array<Eigen::Vector3d, kMaxSpheres> center;  ///< [m] in base, of the first size()
   std::array<Eigen::Vector3d, kMaxJoints> axis;     ///< of every joint, in base
@@ -38,11 +38,11 @@ class ArmSpheres {
   /// \throws Error where there is no sphere or too many, a segment does not exist, or a number is out of its range
   ArmSpheres(const Chain& chain, std::vector<LinkSphere> spheres);
 
-  /// Covers the boxes, cylinders and spheres of a URDF whole: each link's `collision` shapes, or where it has none its
-  /// `visual` ones. Links that fixed joints carry beside the arm are part of it, e.g. a tool behind the tip; movable
-  /// branches are not. Links with meshes get spheres as by along_links(), links without any shape none. A cylinder of
-  /// radius r and length L becomes m = ⌈L/r⌉ spheres of radius √(r² + (L/2m)²), at most 1.12 r; a box small boxes, a
-  /// sphere each.
+  /// Covers the boxes, cylinders and spheres of a URDF completely: each link's `collision` shapes, or the `visual`
+  /// shapes of a link that has no `collision` shapes. Links that fixed joints attach beside the arm belong to the arm,
+  /// e.g. a tool behind the tip; movable branches do not. Links with meshes get spheres as by along_links(), links
+  /// without any shape get none. A cylinder of radius r and length L becomes m = ⌈L/r⌉ spheres of radius √(r² +
+  /// (L/2m)²), at most 1.12 r; a box becomes small boxes, with a sphere for each.
   /// \param source a file's path, or the XML itself: what the chain was read from
   /// \param radius [m] > 0, of links with meshes
   /// \throws Error where the source is no URDF, does not hold this arm, or a shape's size is not positive
@@ -60,9 +60,9 @@ class ArmSpheres {
   const std::vector<LinkSphere>& spheres() const noexcept { return spheres_; }
   /// Radius of sphere i [m].
   double radius(int i) const noexcept { return spheres_[static_cast<std::size_t>(i)].radius; }
-  /// How many joints move sphere i, 0 … n: the first ones.
+  /// Number of joints that move sphere i, 0 … n: the first joints of the chain.
   int joints(int i) const noexcept { return joints_[static_cast<std::size_t>(i)]; }
-  /// The first sphere that a joint moves; those before it belong to the base.
+  /// Index of the first sphere that a joint moves; the spheres before it belong to the base.
   int first_moving() const noexcept { return first_moving_; }
 
   /// Fills `state` for joint positions q (n,). Real time.

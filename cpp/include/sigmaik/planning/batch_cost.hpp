@@ -1,7 +1,7 @@
 #pragma once
 /// \file batch_cost.hpp
-/// What motions with support states pay for where they are, asked for all states at once: a JointCost, or a user's own,
-/// which may be slow to call and may throw.
+/// A cost of all states of a motion with support states at once: a JointCost, or a user's own cost, which may be slow
+/// to call and may throw.
 
 #include <cstddef>
 #include <memory>
@@ -16,8 +16,8 @@ class BatchCost {
   /// Number of joints, n.
   virtual int dof() const noexcept = 0;
 
-  /// Values, and gradients where `gradient` is not null, at `count` configurations. What it throws ends the plan, and
-  /// reaches who asked for it.
+  /// Values, and gradients where `gradient` is not null, at `count` configurations. An exception ends the plan and
+  /// reaches the caller of the planner.
   /// \param q (count, n) in C order, finite
   /// \param value out: (count,), finite   \param gradient out: (count, n), finite, or null
   virtual void evaluate(std::size_t count, const double* q, double* value, double* gradient) const = 0;

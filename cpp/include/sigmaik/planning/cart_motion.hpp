@@ -12,13 +12,14 @@
 
 namespace sigmaik::planning {
 
-/// What motions with one axis and with two have in common: M samples, evenly spaced in time.
+/// Measures of motions with one axis and with two axes, of M samples, evenly spaced in time.
 struct CartMeasures {
   std::vector<double> flange_xy;  ///< (M, 2) in C order [m], the path that was given
   double radius = 0.0;            ///< [m] of the forbidden cylinder, without the margin
   double margin = 0.0;            ///< [m] added to the radius in planning
   double duration = 1.0;          ///< [s] from the first to the last sample
-  /// [m²] Σ |Δ|² of the cart; with a corner between samples, of the steps that it makes, each over its part of a sample
+  /// [m²] Σ |Δ|² of the cart. A corner between samples divides a step, and each part counts |Δ|² over its part of a
+  /// sample.
   double energy = 0.0;
   bool admissible = false;  ///< no sample is within the radius
   double clearance = 0.0;   ///< [m] the point's least distance from the first joint's axis, between the samples too
@@ -33,8 +34,8 @@ struct CartMeasures {
   double time_inside() const noexcept { return inside * duration / (samples() - 1); }
 };
 
-/// Of a cart with one axis: straight between samples, but where `corners` has one between two of them, at the tip of a
-/// forbidden region.
+/// Motion of a cart with one axis, straight between samples. Only a corner between two samples, at the tip of a
+/// forbidden region, bends a step: see `corners`.
 struct CartMotion : CartMeasures {
   std::vector<double> x;            ///< (M,) [m] of the cart
   std::vector<double> lower;        ///< (M,) [m] λ− at radius + margin; +∞ where the cart is free
@@ -42,9 +43,9 @@ struct CartMotion : CartMeasures {
   std::vector<std::int8_t> sides;   ///< (M,) 1 above a forbidden interval, −1 below, 0 where there is none, or inside
   std::vector<CartRegion> regions;  ///< of an exact law
   std::vector<double> corners;      ///< (K,) [samples] where the law bends, and its ends
-  std::vector<double> corner_x;     ///< (K,) [m] there
+  std::vector<double> corner_x;     ///< (K,) [m] positions of the corners
   std::vector<double> multipliers;  ///< (M,) [m] of an exact law, see CartLaw; else empty
-  std::string method = "given";     ///< "exact", "gradient", or "given" for a law that was only looked at
+  std::string method = "given";     ///< "exact", "gradient", or "given" for a law that was only evaluated
   int iterations = 0;               ///< steps of the gradient descent, or taut strings drawn
 
   double max_speed() const noexcept;         ///< [m/s]
@@ -54,10 +55,10 @@ struct CartMotion : CartMeasures {
   std::vector<double> sample(const std::vector<double>& times) const;
 };
 
-/// Of a cart with two axes, straight between its samples.
+/// Motion of a cart with two axes, straight between its samples.
 struct PlaneCartMotion : CartMeasures {
   std::vector<double> xy;    ///< (M, 2) in C order [m] of the cart
-  std::vector<double> push;  ///< (M,) [m], see PlaneCartLaw; empty for a motion that was only looked at
+  std::vector<double> push;  ///< (M,) [m], see PlaneCartLaw; empty for a motion that was only evaluated
   double farthest = 0.0;     ///< [m] the point's largest distance from the first joint's axis
   int starts = 0;            ///< first guesses tried
   int programs = 0;          ///< quadratic programs solved
@@ -69,37 +70,37 @@ struct PlaneCartMotion : CartMeasures {
   std::vector<double> sample(const std::vector<double>& times) const;
 };
 
-/// cart_law(), measured.
+/// The motion of cart_law() with its measures.
 /// \throws Error as cart_law()
 CartMotion cart_motion(const PlanarPath& path, double start, double end, double radius,
                        const CartOptions& options = {});
 
-/// cart_descent() from `guess` (M,), by default the straight line from start to end, measured. From an inadmissible
-/// guess the descent stops at the first admissible law; from an admissible one it goes on smoothing. Of the options
-/// only margin and duration count.
+/// The motion of cart_descent() from `guess` (M,) with its measures; the default guess is the straight line from start
+/// to end. From an inadmissible guess the descent stops at the first admissible law; from an admissible guess it goes
+/// on smoothing. Only the options margin and duration count.
 /// \throws Error where an argument is out of its range, or the guess does not go from start to end
 CartMotion cart_motion_by_descent(const PlanarPath& path, double start, double end, double radius,
                                   const CartOptions& options = {}, const CartDescent& descent = {},
                                   std::vector<double> guess = {});
 
-/// A first guess of the descent that passes all forbidden intervals, on the sides of the exact law: a jump to the
+/// A first guess for the descent that passes all forbidden intervals, on the sides of the exact law: a jump to the
 /// cart's range, or past the whole region where the range is infinite, and back at the end (Salvato et al. 2022, figure
 /// 9).
 /// \throws Error as cart_law()
 std::vector<double> admissible_guess(const PlanarPath& path, double start, double end, double radius,
                                      const CartOptions& options = {});
 
-/// Any law x (M,) [m], measured.
+/// Measures of any law x (M,) [m].
 /// \throws Error where an argument is out of its range
 CartMotion evaluate_cart_motion(const PlanarPath& path, std::vector<double> x, double radius, double margin = 0.0,
                                 double duration = 1.0);
 
-/// plane_cart_law(), measured.
+/// The motion of plane_cart_law() with its measures.
 /// \throws Error as plane_cart_law()
 PlaneCartMotion plane_cart_motion(const PlanarPath& path, const AxisPair& start, const AxisPair& end, double radius,
                                   const PlaneCartOptions& options = {});
 
-/// Any motion xy (M, 2) in C order [m], measured.
+/// Measures of any motion xy (M, 2) in C order [m].
 /// \throws Error where an argument is out of its range
 PlaneCartMotion evaluate_plane_cart_motion(const PlanarPath& path, std::vector<double> xy, double radius,
                                            double margin = 0.0, double duration = 1.0);

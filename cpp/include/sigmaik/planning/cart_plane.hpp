@@ -1,15 +1,17 @@
 #pragma once
 /// \file cart_plane.hpp
-/// Where to drive a cart with two linear axes, so that a point of the arm on it stays clear of the first joint's axis:
-/// the case that Salvato et al. (2022) leave open.
+/// Motions of a cart with two linear axes, so that a point of the arm on the cart stays clear of the first joint's
+/// axis: the case that Salvato et al. (2022) leave open.
 ///
-/// The cart is at c_i, the point at f_i, both in the plane, in M samples evenly spaced in time. Wanted is the least
-/// Σ_i |c_{i+1} − c_i|² between given ends with |c_i − f_i| ≥ r. Seen from the point the obstacle is a disc at rest,
-/// and d = c − f goes round it one way or the other: what is combinatorial is how often d winds about the disc.
+/// The cart is at c_i, the point at f_i, both in the plane, in M samples evenly spaced in time. The motion sought has
+/// the least Σ_i |c_{i+1} − c_i|² between given ends with |c_i − f_i| ≥ r. Seen from the point the obstacle is a disc
+/// at rest, and d = c − f goes round this disc one way or the other: the combinatorial part of the problem is how often
+/// d winds about the disc.
 ///
-/// Where f moves on a straight line at constant speed, Σ|Δc|² is Σ|Δd|² but for a constant, and the plane outside a
-/// disc, with its turns counted, has one shortest way between two points: tangent, arc, tangent. Other paths f pull d
-/// with −f̈, and may have several local minima of the same winding; the best of a bounded number of starts is returned.
+/// Where f moves on a straight line at constant speed, Σ|Δc|² equals Σ|Δd|² up to a constant, and outside a disc there
+/// is one shortest way between two points for each number of turns: tangent, arc, tangent. On other paths f, the term
+/// −f̈ acts on d like a force, and there may be several local minima of the same winding; the answer is the best of a
+/// bounded number of starts.
 
 #include <array>
 #include <limits>
@@ -26,13 +28,14 @@ using AxisPair = std::array<double, 2>;
 /// No limit.
 inline constexpr double kUnlimited = std::numeric_limits<double>::infinity();
 
-/// What a motion in the plane must keep to.
+/// Constraints and settings of a motion in the plane.
 struct PlaneCartOptions {
   AxisPair lower{-kUnlimited, -kUnlimited};  ///< [m] of each axis
-  AxisPair upper{kUnlimited, kUnlimited};    ///< [m]; equal: the axis stands
+  AxisPair upper{kUnlimited, kUnlimited};    ///< [m]; equal to lower: the axis stands
   double margin = 0.0;                       ///< [m] ≥ 0, added to the radius
-  double max_radius = kUnlimited;            ///< [m] > radius + margin, the farthest that the point may be
-  /// [rad] by which the point's azimuth turns seen from the axis, positive about z, to within half a turn; none: any.
+  double max_radius = kUnlimited;            ///< [m] > radius + margin, largest distance of the point
+  /// [rad] by which the point's azimuth, seen from the axis, turns, positive about z, within half a turn; none: any
+  /// angle.
   std::optional<double> turn = std::nullopt;
   double duration = 1.0;                       ///< [s] between the first and the last sample
   AxisPair max_speed{kUnlimited, kUnlimited};  ///< [m/s] > 0 of each axis
@@ -54,13 +57,13 @@ struct PlaneCartLaw {
 
 /// The motion of the least energy from start to end [m] along `path` (M ≥ 3), outside the disc of `radius` [m] > 0.
 ///
-/// Starts: the straight motion, taken round the disc on either side wherever it runs into it, and tangent, arc,
-/// tangent; with as many turns as asked for, or any. Each is improved on a coarse grid of times: |d_i| ≥ r is replaced
-/// by d_i·n_i ≥ r with n_i = d_i/|d_i|, a quadratic program whose answer keeps out of the disc, and costs no more than
-/// the guess did; and again from there. Where that stops the conditions of Karush, Kuhn and Tucker of the problem
-/// itself hold. The best is refined on all samples. Limits of speed and acceleration are held on the way that is the
-/// best without them.
-/// \throws CartError with the reason where none was found
+/// The starts are the straight motion, taken round the disc on either side wherever the motion runs into the disc, and
+/// tangent, arc, tangent; with as many turns as asked for, or any. Each start is improved on a coarse grid of times: a
+/// quadratic program has d_i·n_i ≥ r, n_i = d_i/|d_i|, in place of |d_i| ≥ r, so that its answer keeps out of the disc
+/// and costs no more than the guess did. The answer is the guess of the next program. Where this iteration stops, the
+/// conditions of Karush, Kuhn and Tucker of the original problem hold. The best motion is refined on all samples.
+/// Limits of speed and acceleration are added afterwards, along the motion that is the best without them.
+/// \throws CartError with the reason where no motion was found
 /// \throws Error where an argument is out of its range
 PlaneCartLaw plane_cart_law(const PlanarPath& path, const AxisPair& start, const AxisPair& end, double radius,
                             const PlaneCartOptions& options = {});

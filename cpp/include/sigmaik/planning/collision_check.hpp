@@ -1,6 +1,6 @@
 #pragma once
 /// \file collision_check.hpp
-/// Obstacles that a motion must not touch: what planners check their answers by.
+/// The check of a planner's answer: obstacles that a motion must not touch.
 
 #include <cstddef>
 #include <string>
@@ -25,7 +25,7 @@ class CollisionCheck {
   /// The least signed distance [m] of the arm to the obstacles at `count` configurations q (count, n) in C order.
   double least_distance(std::size_t count, const double* q) const;
 
-  /// No sample of the motion touches an obstacle, ten samples a step.
+  /// Whether no sample of the motion touches an obstacle, with ten samples for each step.
   bool free(const Trajectory& motion) const;
 
   /// \param name of the configuration in the error's text, such as "start"

@@ -2,14 +2,14 @@
 /// \file collision_costs.hpp
 /// Costs that keep a plan off obstacles, off the arm itself, and off its joint limits.
 ///
-/// Collisions are sums of hinges of distances d that are to be at least ε, the clearance, as CHOMP has them (Ratliff et
-/// al. 2009; Zucker et al. 2013):
+/// A collision cost is a sum of hinges c of distances d that should be at least the clearance ε, as in CHOMP (Ratliff
+/// et al. 2009; Zucker et al. 2013):
 ///
 ///     c(d) = 0   d ≥ ε,        (ε − d)²/(2ε)   0 ≤ d < ε,        ε/2 − d   d < 0
 ///
-/// quadratic where there is contact to come, linear where there is contact, with one continuous slope. Their Hessians
-/// are positive semidefinite: Σ w(d) (∂d/∂q)ᵀ(∂d/∂q) with w = 1/max(ε, ε − d) within the clearance, the curvature of
-/// the parabola that touches the hinge from above. Where 0 ≤ d < ε it is c″, so that this is the Gauss-Newton Hessian.
+/// c is quadratic shortly before contact and linear in contact, with one continuous slope. The Hessians are positive
+/// semidefinite: Σ w(d) (∂d/∂q)ᵀ(∂d/∂q) with w = 1/max(ε, ε − d) within the clearance, the curvature of the parabola
+/// that touches the hinge from above. Where 0 ≤ d < ε, w is c″, so that the sum is the Gauss-Newton Hessian.
 
 #include <array>
 #include <cstddef>
@@ -32,12 +32,12 @@ JointCostPtr collision_cost(const ArmSpheres& spheres, const DistanceField& fiel
 /// Two spheres of an arm, by index.
 using SpherePair = std::array<int, 2>;
 
-/// Pairs of spheres that may come into contact: those of links that are not neighbours, i.e. with two or more joints
-/// between them, the base's included. Left out are those nearer than `clearance` at more than a share `most_contacts`
-/// of 1000 quasi-random configurations within the joint limits (±π where there are none): they are so by their make.
-/// The same on every machine; takes some ms.
+/// Pairs of spheres that may come into contact: spheres of links that are not neighbours, i.e. with two or more joints
+/// between them, the base included. Pairs that are nearer than `clearance` at more than a share `most_contacts` of 1000
+/// quasi-random configurations within the joint limits (±π where there are none) are left out: such spheres are close
+/// by the arm's design. The result is the same on every machine, and takes some ms.
 /// \param clearance [m] ≥ 0, that of the cost   \param most_contacts 0 … 1
-/// \throws Error where one is out of its range
+/// \throws Error where a parameter is out of its range
 std::vector<SpherePair> self_collision_pairs(const ArmSpheres& spheres, double clearance = 0.02,
                                              double most_contacts = 0.1);
 
@@ -47,7 +47,7 @@ std::vector<SpherePair> self_collision_pairs(const ArmSpheres& spheres, double c
 JointCostPtr self_collision_cost(const ArmSpheres& spheres, const std::vector<SpherePair>& pairs,
                                  double clearance = 0.02, double weight = 1.0);
 
-/// weight · Σ_j ½ x_j², x_j the way by which joint j is nearer to a limit than `margin` [rad or m], or beyond it.
+/// weight · Σ_j ½ x_j², x_j the distance by which joint j is nearer to a limit than `margin` [rad or m], or beyond it.
 /// Joints without limits cost nothing.
 /// \param margin ≥ 0
 /// \throws Error where a parameter is out of its range

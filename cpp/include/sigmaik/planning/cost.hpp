@@ -1,6 +1,6 @@
 #pragma once
 /// \file cost.hpp
-/// Costs put together before it is known of which arm:
+/// Costs that are combined before the arm is known:
 ///
 ///     Cost cost = costs::Potential{} + 2.0 * costs::Collision{field} + costs::JointLimits{};
 ///     Trajectory plan = time_optimal(arm, start, goal, cost);
@@ -20,7 +20,7 @@
 
 namespace sigmaik::planning {
 
-/// What a Cost is made of.
+/// A type that can be a term of a Cost.
 template <typename T>
 concept CostTerm = requires(const T& term, const Chain& chain) {
   { term.bind(chain) } -> std::convertible_to<BatchCostPtr>;
@@ -29,23 +29,23 @@ concept CostTerm = requires(const T& term, const Chain& chain) {
 /// A weighted sum of terms. A value.
 class Cost {
  public:
-  /// Nothing: costs nothing.
+  /// The empty cost, which is zero.
   Cost() = default;
   /// One term. Implicit, so that terms add up.
   template <typename Term>
     requires(!std::same_as<Term, Cost> && CostTerm<Term>)
   Cost(Term term)
       : Cost(Bind([term = std::move(term)](const Chain& chain) -> BatchCostPtr { return term.bind(chain); })) {}
-  /// A cost that is made already, of one arm's joints.
+  /// An existing cost of one arm's joints.
   template <std::derived_from<BatchCost> Made>
   Cost(std::shared_ptr<Made> cost) {
     if (cost) parts_.push_back({1.0, [cost = BatchCostPtr(std::move(cost))](const Chain&) { return cost; }});
   }
 
-  /// Whether nothing costs anything.
+  /// Whether the cost has no terms.
   bool empty() const noexcept { return parts_.empty(); }
 
-  /// The sum for one arm: a JointCost where every term is one, null where there are none.
+  /// The sum for one arm: a JointCost where every term is one, null where there are no terms.
   /// \throws Error where a term does not fit the chain
   BatchCostPtr bind(const Chain& chain) const;
   /// The sum for planners that need Hessians.
@@ -77,7 +77,7 @@ inline Cost operator*(Cost cost, double factor) { return cost *= factor; }
 
 /// The library's terms.
 namespace costs {
-// Found for two terms, of which neither is a Cost yet.
+// The operator must be found for two terms of which neither is a Cost yet.
 using planning::operator+;
 using planning::operator*;
 }  // namespace costs

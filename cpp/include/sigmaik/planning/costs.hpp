@@ -18,12 +18,12 @@ JointCostPtr potential_cost(const SingularSets& sets, const Potential& potential
 /// \throws Error where a parameter is out of its range
 JointCostPtr manipulability_cost(const SingularSets& sets, double weight = 1e2, double epsilon = 1e-6);
 
-/// The same for any chain, from its Jacobian. The Hessian is by differences of the gradient.
+/// The same cost for any chain, from its Jacobian. The Hessian comes from differences of the gradient.
 /// \throws Error where a parameter is out of its range
 JointCostPtr manipulability_cost(const Chain& chain, double weight = 1e2, double epsilon = 1e-6);
 
-/// weight · ξ(q), the geometry-aware index with Σ = kI (Petrović et al., eq. 12), cut off at `most`: it is infinite at
-/// a singularity, where it would drown everything else, and points nowhere.
+/// weight · ξ(q), the geometry-aware index with Σ = kI (Petrović et al., eq. 12), cut off at `most`: at a singularity
+/// the index is infinite, outweighs every other cost, and has no slope.
 /// \throws Error where a parameter is out of its range
 JointCostPtr geometry_aware_cost(const Chain& chain, double k, double weight = 1.0, double most = 2000.0);
 

@@ -15,15 +15,17 @@ namespace sigmaik::planning {
 /// Signed distance to the nearest surface [m]: positive in free space, negative inside obstacles. A value: cheap to
 /// copy (copies share one immutable grid), safe to use from many threads.
 ///
-/// Inside the grid the nodes' distances are interpolated trilinearly: continuous, with a gradient that jumps at the
-/// cells' faces. As distances change by no more than 1 m per metre, an interpolated one is wrong by at most √3/2 cells.
+/// Inside the grid the nodes' distances are interpolated trilinearly: the result is continuous, with a gradient that
+/// jumps at the cells' faces. Distances change by no more than 1 m per metre, so an interpolated distance is wrong by
+/// at most √3/2 cells.
 ///
-/// Outside it is a bound from below of the distance to whatever lies within the grid: with p̄ the nearest point of the
-/// grid's box, and D the distance there, |p − o|² ≥ |p − p̄|² + |p̄ − o|² for every point o of a convex box, so that
+/// Outside the grid the field is a lower bound of the distance to every obstacle within the grid: with p̄ the nearest
+/// point of the grid's box, and D the distance there, |p − o|² ≥ |p − p̄|² + |p̄ − o|² for every point o of a convex box,
+/// so that
 ///
 ///     d(p) = √(D(p̄)² + |p − p̄|²)   where D ≥ 0,   D(p̄) + |p − p̄|   where an obstacle is cut off by the grid:
 ///
-/// continuous, and growing with the way out.
+/// This bound is continuous, and grows with the distance from the box.
 class DistanceField {
  public:
   /// Nodes along each axis.
@@ -43,9 +45,9 @@ class DistanceField {
   /// Distance between neighbouring nodes [m].
   double cell() const noexcept { return cell_; }
 
-  /// At a point [m]. Real time.
+  /// The distance at a point [m]. Real time.
   double distance(const Eigen::Vector3d& point) const noexcept;
-  /// With its gradient. Real time.
+  /// The same, with its gradient. Real time.
   double distance(const Eigen::Vector3d& point, Eigen::Vector3d& gradient) const noexcept;
 
  private:

@@ -1,6 +1,6 @@
 #pragma once
 /// \file joint_cost.hpp
-/// What a plan pays for where it is: a smooth function of joint positions, added up over a trajectory's nodes.
+/// A smooth cost of joint positions, added up over a trajectory's nodes.
 
 #include <cstddef>
 #include <memory>
@@ -19,10 +19,10 @@ class JointCost : public BatchCost {
   /// Cost, with gradient (n,) and Hessian (n, n), symmetric. Real time.
   virtual double model(const JointRef& q, JointVector& gradient, JointMatrix& hessian) const noexcept = 0;
 
-  /// Cost, with gradient (n,). Real time; by default what model() says.
+  /// Cost, with gradient (n,). Real time; the default calls model().
   virtual double gradient(const JointRef& q, JointVector& gradient) const noexcept;
 
-  /// One configuration after another. Real time.
+  /// Evaluates one configuration after another. Real time.
   void evaluate(std::size_t count, const double* q, double* value, double* gradient) const noexcept final;
 };
 

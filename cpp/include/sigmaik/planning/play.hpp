@@ -10,7 +10,7 @@
 
 namespace sigmaik::planning {
 
-/// What a servo made of a planned motion: M samples, one at the begin of each cycle, and one at the last cycle's end.
+/// A planned motion as a servo played it: M samples, one at the start of each cycle, and one at the last cycle's end.
 struct Playback {
   int dof = 0;                  ///< n
   std::vector<double> t;        ///< (M,) [s] times of the trajectory, and those for which its end is held
@@ -37,9 +37,9 @@ struct Playback {
 ///
 /// In the cycle from t to t + dt the target is the pose planned for t, and the feed-forward twist is J(q) q̇ of the plan
 /// in the middle of the cycle. A cycle of constant q̇ leaves the error ½ dt² J̇ q̇, and the gains keep the sum of these
-/// errors to ½ dt |J̇ q̇| / gain: micrometres at 1 kHz. The soft start costs more. The servo holds its limits and treats
-/// singularities by its own rule, so it may leave the plan; its gains bring it back. The servo's history goes on: call
-/// Servo::reset() before.
+/// errors to ½ dt |J̇ q̇| / gain: micrometres at 1 kHz. The soft start adds a larger error. The servo holds its limits
+/// and treats singularities by its own rule, so the arm may leave the plan; the servo's gains bring it back. The servo
+/// keeps its history: call Servo::reset() before.
 /// \param settle [s] ≥ 0 for which the last pose is held
 /// \throws Error where the trajectory is empty or has another number of joints, the servo stands elsewhere (1e-6 rad or
 ///     m), or settle is not finite or negative

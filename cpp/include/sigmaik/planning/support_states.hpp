@@ -1,12 +1,12 @@
 #pragma once
 /// \file support_states.hpp
-/// Motions as support states under a Gaussian-process prior, moved so that a cost of their states falls (Petrović et
-/// al.): by its gradient, or by samples.
+/// Motions as support states under a Gaussian-process prior, moved so that a cost of the states falls (Petrović et
+/// al.): by the cost's gradient, or by samples.
 ///
-/// N + 1 states, evenly in unit time, the first and last fixed. The prior is that of white noise on acceleration (a
-/// constant velocity model, eqs. 7 to 9) for every joint, conditioned on both end positions, about the straight line μ:
-/// its covariance, scaled to a largest variance of 1, is K̄ ∝ k(s, u) = s(1 − u)(2u − s² − u²)/6 for s ≤ u. Between the
-/// states the prior's mean is the natural cubic spline through them.
+/// A motion has N + 1 states, evenly in unit time; the first and the last are fixed. The prior of every joint is white
+/// noise on acceleration (a constant velocity model, eqs. 7 to 9), conditioned on both end positions, about the
+/// straight line μ. The prior's covariance, scaled to a largest variance of 1, is K̄ ∝ k(s, u) = s(1 − u)(2u − s² −
+/// u²)/6 for s ≤ u. Between the states the prior's mean is the natural cubic spline through them.
 
 #include <cstdint>
 #include <memory>
@@ -34,7 +34,7 @@ struct SupportStates {
 /// Settings of SupportPlanner::gradient().
 struct GradientOptions {
   int states = 21;             ///< N + 1, 3 to 1000
-  double prior_weight = 10.0;  ///< > 0: what ‖q − μ‖² in K̄⁻¹ weighs against the cost
+  double prior_weight = 10.0;  ///< > 0: weight of ‖q − μ‖² in K̄⁻¹ against the cost
   int max_iterations = 100;    ///< ≥ 1
   double tolerance = 1e-4;     ///< ≥ 0: stops where an iteration gains less than this part of the objective
   /// ≥ 0: plan() tries this many first guesses drawn from the prior where the motion found from the straight line
@@ -53,7 +53,7 @@ struct StochasticOptions {
   double deviation = 0.5;      ///< [rad or m] > 0, of the samples half-way
   double decay = 0.98;         ///< in (0, 1]: of the deviation, from one iteration to the next
   double temperature = 0.1;    ///< > 0: λ of the weights exp(−(G − G_min)/(λ (G_max − G_min))) (15), normalised
-  double prior_weight = 10.0;  ///< ≥ 0: as for the gradient; it keeps joints that the cost does not see from drifting
+  double prior_weight = 10.0;  ///< ≥ 0: as for the gradient; keeps joints without influence on the cost from drifting
   double tolerance = 1e-3;     ///< ≥ 0: stops where eight iterations together gain less than this part of the objective
   std::uint64_t seed = 0;      ///< the same seed gives the same motion
   bool refine = false;         ///< plan() finishes with gradient() from the motion found
@@ -63,10 +63,9 @@ struct StochasticOptions {
 /// Plans for one arm and one cost, and keeps the covariance's factors. One object serves one thread.
 class SupportPlanner {
  public:
-  /// \param obstacles what plan()'s motions must not touch; their cost is part of `cost` (collision_cost())
-  /// \throws Error where the number of states is out of its range, or the cost or the obstacles' spheres are for
-  /// another
-  ///     number of joints
+  /// \param obstacles must not be touched by plan()'s motions; their cost is part of `cost` (collision_cost())
+  /// \throws Error where the number of states is out of its range, or where the cost or the obstacles' spheres have
+  ///     another number of joints
   SupportPlanner(Chain chain, BatchCostPtr cost, int states, std::optional<CollisionCheck> obstacles = std::nullopt);
   ~SupportPlanner();
   /// Takes over the memory of another; the other may only be destroyed or assigned to.
@@ -75,26 +74,26 @@ class SupportPlanner {
   SupportPlanner& operator=(SupportPlanner&&) noexcept;
 
   /// Minimises Σ cost(q_i) + w ‖q − μ‖² in K̄⁻¹ by L-BFGS in x, q = μ + C x, K̄ = C Cᵀ, from `guess` (states, n), or from
-  /// the straight line where that is empty. States are kept within the limits by projection.
+  /// the straight line where `guess` is empty. States are kept within the limits by projection.
   /// \throws Error where an option is out of its range, or an end outside the limits; what the cost throws
   SupportStates gradient(const JointVector& start, const JointVector& goal, const GradientOptions& options,
                          const std::vector<double>& guess = {});
 
-  /// Moves the states by the mean of samples about them, weighted by their cost (14) to (16), and returns the best that
-  /// was met. The same for the same seed.
+  /// Moves the states by the mean of samples about them, weighted by their cost (14) to (16), and returns the best
+  /// states of all iterations. The same seed gives the same answer.
   /// \throws Error as gradient()
   SupportStates stochastic(const JointVector& start, const JointVector& goal, const StochasticOptions& options);
 
   /// A motion drawn from the prior about the straight line, of standard deviation `deviation` [rad or m] ≥ 0 half-way,
-  /// its states projected on the limits: a first guess. The same for the same seed.
+  /// its states projected on the limits: a first guess. The same seed gives the same motion.
   /// \throws Error as gradient()
   SupportStates draw(const JointVector& start, const JointVector& goal, double deviation, std::uint64_t seed);
 
   /// The motion of gradient() from the straight line: the natural spline through its states, timed, within the position
-  /// limits between the states too, with its clearance from singularities. Where it touches an obstacle, first guesses
-  /// are drawn from the prior, the same ones each time, and the motion of least cost that touches none is the answer.
-  /// The status is Failed where all of them touch, Optimal where the search stopped by itself, else Feasible. The cost
-  /// is the objective.
+  /// limits between the states too, with its clearance from singularities. If this motion touches an obstacle, first
+  /// guesses are drawn from the prior, the same guesses each time, and the answer is the motion of least cost that
+  /// touches no obstacle. The status is Failed if every motion touches an obstacle, Optimal if the search stopped by
+  /// itself, else Feasible. The cost is the objective.
   /// \throws Error as gradient(), or where start or goal touches an obstacle
   Trajectory plan(const JointVector& start, const JointVector& goal, const GradientOptions& options);
 

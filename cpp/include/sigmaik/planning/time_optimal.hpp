@@ -1,7 +1,8 @@
 #pragma once
 /// \file time_optimal.hpp
-/// From one configuration to another in the least time, at little effort, within limits, away from what a cost marks:
-/// direct transcription with free end time of a double integrator per joint (Beck et al. 2022, eqs. 21 to 27).
+/// Motions from one configuration to another in the least time, at little effort, within limits, away from
+/// configurations of high cost: direct transcription with free end time of a double integrator per joint (Beck et al.
+/// 2022, eqs. 21 to 27).
 ///
 /// With N nodes, step h = t_F/N and q̈ constant over a step,
 ///
@@ -9,14 +10,15 @@
 ///     q_{k+1} = q_k + h q̇_k + h²/2 q̈_k,   q̇_{k+1} = q̇_k + h q̈_k,   k = 0 … N−2
 ///     (q_0, q̇_0) and (q_{N−1}, q̇_{N−1}) given,   lower ≤ q_k ≤ upper,   |q̇_k| ≤ velocity,   |q̈_k| ≤ acceleration
 ///
-/// As printed in the paper, h is t_F/N where the motion takes N − 1 steps: the last one, of length h, is spent at the
-/// goal. Limits at the nodes are limits between them for velocities, not for positions: where a velocity changes its
-/// sign within a step, q overshoots by up to h²/8 times the acceleration. So, beyond the paper, q_k + h q̇_k/2 is kept
-/// within the position limits too: a step's parabola stays in the hull of its ends and that point.
+/// As in the paper, h is t_F/N although the motion takes N − 1 steps: the last step, of length h, is spent at the goal.
+/// Velocities that hold their limits at the nodes also hold them between the nodes, but positions do not: where a
+/// velocity changes its sign within a step, q overshoots by up to h²/8 times the acceleration. So, beyond the paper,
+/// q_k + h q̇_k/2 is kept within the position limits too: the parabola of a step stays in the hull of its ends and this
+/// point.
 ///
-/// Solved by a primal-dual interior-point method whose every iterate satisfies the dynamics: in p = h q̇ and a = h² q̈
-/// they do not know h, so that a Newton step is one Riccati recursion with one more column for h. Answers are local
-/// minima.
+/// The solver is a primal-dual interior-point method whose every iterate satisfies the dynamics: in p = h q̇ and a = h²
+/// q̈ the dynamics do not depend on h, so that a Newton step is one Riccati recursion with one more column for h.
+/// Answers are local minima.
 
 #include <memory>
 #include <optional>
@@ -39,7 +41,8 @@ struct TimeOptimalOptions {
   double tolerance = 1e-9;     ///< in [1e-12, 1e-2]: what is left to gain, as a part of the objective between the ends
   int max_iterations = 500;    ///< ≥ 1, Newton steps of a start
   bool between_nodes = true;   ///< positions keep their limits between the nodes too; false: as in the paper
-  /// Where the motion found still leads through what the cost marks, look on its other sides too, and keep the best.
+  /// Where the motion found still leads through configurations of high cost, the planner also tries the other sides
+  /// of these configurations, and keeps the best motion.
   bool restarts = true;
   /// [1/rad²] > 0, η₂ of plan()'s clearance: see clearance()
   double clearance_width = 400.0;
@@ -68,7 +71,7 @@ struct TimeOptimalResult {
   std::vector<double> qddot;               ///< (N, n) in C order: accelerations [rad/s² or m/s²], zero at the last node
 };
 
-/// Plans for one arm and one cost, again and again: keeps its memory. One a thread.
+/// Plans for one arm and one cost, and keeps its memory from one plan to the next. One object serves one thread.
 class TimeOptimal {
  public:
   /// \param cost L, or null for none
@@ -76,7 +79,7 @@ class TimeOptimal {
   ///     joint's acceleration
   TimeOptimal(Chain chain, JointCostPtr cost, const TimeOptimalOptions& options = {});
   /// The same with the arm's singular sets, for plan(); the other constructor takes SingularSets::of(chain).
-  /// \param obstacles what plan()'s motions must not touch; their cost is part of `cost` (collision_cost())
+  /// \param obstacles must not be touched by plan()'s motions; their cost is part of `cost` (collision_cost())
   /// \throws Error also where the sets or the obstacles' spheres are for another number of joints
   TimeOptimal(Chain chain, JointCostPtr cost, const TimeOptimalOptions& options, std::optional<SingularSets> sets,
               std::optional<CollisionCheck> obstacles = std::nullopt);
@@ -92,9 +95,9 @@ class TimeOptimal {
   TimeOptimalResult solve(const TimeOptimalProblem& problem);
 
   /// The motion with its clearance from singularities between the nodes. With `restarts`, a motion that crosses a
-  /// singular set where it need not is solved once more, from the other side of the first such crossing; of the two the
-  /// answer is the one with the smaller along(), as nodes may lie on either side of a wall that the motion between them
-  /// goes through. A motion that touches an obstacle between its nodes has failed.
+  /// singular set where it need not is solved once more, from the other side of the first such crossing. The answer is
+  /// the motion with the smaller along(), because nodes may lie on both sides of a wall that the motion between the
+  /// nodes goes through. A motion that touches an obstacle between its nodes has failed.
   /// \throws Error as solve(), or where start or goal touches an obstacle
   Trajectory plan(const TimeOptimalProblem& problem);
 

@@ -23,7 +23,7 @@ enum class PlanStatus : std::int8_t {
 
 /// "optimal", "feasible", "failed".
 const char* to_string(PlanStatus status) noexcept;
-/// The reverse.
+/// The status with this text: the inverse of to_string().
 /// \throws Error for any other text
 PlanStatus plan_status(const std::string& text);
 
@@ -43,7 +43,7 @@ struct Trajectory {
   std::vector<double> qdot;  ///< (N, n) [rad/s or m/s]
   /// (N, n) [rad/s² or m/s²] of the step that begins at the sample, zero in the last row; where `cubic`, at the sample
   std::vector<double> qddot;
-  double duration = std::numeric_limits<double>::quiet_NaN();  ///< [s] NaN where failed; see the planner what it counts
+  double duration = std::numeric_limits<double>::quiet_NaN();  ///< [s] NaN where failed; the planner says what counts
   PlanStatus status = PlanStatus::Failed;                      ///< what the planner did
   double cost = std::numeric_limits<double>::quiet_NaN();      ///< the planner's objective; NaN where failed
   double solve_time = 0.0;                                     ///< [s] of wall-clock time, of the optimiser alone
@@ -55,7 +55,7 @@ struct Trajectory {
   /// Number N of samples.
   std::size_t size() const noexcept { return t.size(); }
 
-  /// At times (M,) [s]; before the first and after the last sample the motion is held there.
+  /// Samples at times (M,) [s]; before the first and after the last sample the motion is held at this sample.
   /// \throws Error where there is nothing to sample or a time is not finite
   JointSamples sample(const std::vector<double>& times) const;
 
@@ -68,7 +68,7 @@ struct Trajectory {
   /// `clearance` are not part of it.
   /// \throws Error where the file cannot be written
   void save(const std::string& file) const;
-  /// Reads such a file; its `clearance` is empty.
+  /// Reads a file of save(); the trajectory has no `clearance`.
   /// \throws Error where the file cannot be read, or is not that of a trajectory
   static Trajectory load(const std::string& file);
 };

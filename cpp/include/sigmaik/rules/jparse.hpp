@@ -6,8 +6,8 @@
 
 namespace sigmaik {
 
-/// J-PARSE (Guptasarma et al.): regular directions exact; along a singular direction the command is scaled
-/// by σ_i/(γσ_max), so that motion stops at the singularity and leaves it again.
+/// J-PARSE (Guptasarma et al.): regular directions are exact; along a singular direction the command is scaled by
+/// σ_i/(γσ_max), so that motion stops at the singularity and leaves it again.
 struct JParse {
   double gamma = 0.1;         ///< in (0, 1]
   double gain_linear = 1.0;   ///< ≥ 0, of the command's linear rows along singular directions (the paper's K)

@@ -6,7 +6,7 @@
 
 namespace sigmaik {
 
-/// Moore and Penrose's inverse, truncated. Exact until it is not: joint speeds grow as 1/σ_i.
+/// Moore and Penrose's inverse, truncated: exact, but joint speeds grow as 1/σ_i.
 struct PseudoInverse {
   double tolerance = 1e-12;  ///< in (0, 1], of σ_max
 

@@ -1,6 +1,6 @@
 #pragma once
 /// \file rule.hpp
-/// What a rule is: a struct of parameters that says what to do with one singular direction of J = Σ σ_i u_i v_iᵀ.
+/// A rule is a struct of parameters that says what to do with one singular direction of J = Σ σ_i u_i v_iᵀ.
 ///
 ///     q̇ = Σ_i g_i v_i + (I − Σ_i p_i v_i v_iᵀ) q̇_posture
 ///
@@ -20,12 +20,13 @@
 
 namespace sigmaik {
 
-/// A relative σ that is zero but for rounding: for rules that must not divide by it and have no threshold of their own.
+/// A relative σ below this value is zero but for rounding, for rules that must not divide by zero and have no
+/// threshold.
 inline constexpr double kRankTolerance = 1e-12;
 /// relative_threshold() of rules that have none of their own.
 inline constexpr double kDefaultThreshold = 0.1;
 
-/// What a rule says of one direction: g_i = inverse · u_iᵀẋ.
+/// A rule's answer for one direction: g_i = inverse · u_iᵀẋ.
 struct Direction {
   double inverse = 0.0;    ///< g_i / u_iᵀẋ
   double projector = 0.0;  ///< p_i: the part of the posture's motion along v_i that is taken away, in [0, 1]
@@ -34,10 +35,10 @@ struct Direction {
   double gain_weight = 0.0;
 };
 
-/// What a rule sees of the whole spectrum, beside its own σ_i.
+/// Data of the whole spectrum, for a rule that needs more than its own σ_i.
 class SpectrumSummary {
  public:
-  /// Of a spectrum with at least one direction, which must outlive the summary.
+  /// The spectrum must have at least one direction and must outlive the summary.
   explicit SpectrumSummary(const Spectrum& spectrum) noexcept
       : largest(spectrum.sigma(0)), smallest(spectrum.sigma(spectrum.size() - 1)), spectrum_(&spectrum) {}
 
@@ -68,18 +69,17 @@ struct RowGains {
 /// A rule. at() and relative_threshold() are called in the loop: noexcept, bounded, without heap.
 ///
 /// - `kName` is the rule's name in texts of errors.
-/// - relative_threshold(), in (0, 1]: a direction with σ_i at or below this part of σ_max is near a singularity. A
-/// Servo
-///   weighs the directions with it where limits act.
+/// - relative_threshold(), in (0, 1]: a direction with σ_i at or below this part of σ_max is near a singularity. Where
+///   limits act, a Servo weights the directions with this threshold.
 /// - at(σ_i ≥ 0, the spectrum) says what to do with a direction.
 ///
-/// Set-up checks the ranges of parameters(), where a rule has that table, and calls check(), where it has that.
+/// Set-up checks the ranges of parameters() and calls check(), where a rule has these members.
 template <typename R>
 concept Rule = requires(const R rule, double sigma, const SpectrumSummary& spectrum) {
   { R::kName } -> std::convertible_to<const char*>;
   { rule.relative_threshold() } noexcept -> std::same_as<double>;
   { rule.at(sigma, spectrum) } noexcept -> std::same_as<Direction>;
-} && std::copyable<R>;  // last: asked of a type that takes a Method, it would depend on itself
+} && std::copyable<R>;  // last: for a type that takes a Method, the concept would depend on itself
 
 /// Checks the parameters of a rule.
 /// \throws Error with the parameter, its value and its range
@@ -96,14 +96,14 @@ concept AmplifyingRule = Rule<R> && requires(const R rule) {
   { rule.row_gains() } noexcept -> std::same_as<RowGains>;
 };
 
-/// A rule that bounds joint speeds: those from one direction, and those from all.
+/// A rule that bounds the joint speeds from one direction, and from all directions together.
 template <typename R>
 concept ClampingRule = Rule<R> && requires(const R rule, const Spectrum& spectrum, int i) {
   { rule.speed_bound(spectrum, i) } noexcept -> std::same_as<double>;
   { rule.speed_bound() } noexcept -> std::same_as<double>;
 };
 
-/// What a rule made of a command.
+/// A rule's answer to a command.
 struct Resolution {
   std::array<double, kMaxTask> speed{};      ///< g_i: q̇ = Σ g_i v_i; 0 beyond size()
   std::array<double, kMaxTask> projector{};  ///< p_i of the posture; 0 beyond size()
@@ -129,7 +129,7 @@ inline Direction damped(double sigma, double lambda, bool regular) noexcept {
   return {ratio * part / lambda, ratio * ratio * part, regular};
 }
 
-// 1/σ_i, or nothing.
+// 1/σ_i, or 0 if the direction is dropped.
 inline Direction truncated(double sigma, bool keep, double projector_if_dropped) noexcept {
   if (keep) return {1.0 / sigma, 1.0, true};
   return {0.0, projector_if_dropped, false};
@@ -137,7 +137,7 @@ inline Direction truncated(double sigma, bool keep, double projector_if_dropped)
 
 }  // namespace detail
 
-/// Applies one rule, known when compiling. Real time.
+/// Applies one rule that is known at compile time. Real time.
 /// \param command (m,) in the rows of the spectrum
 /// \param angular bit i: row i of the command is angular
 template <Rule R>
@@ -145,11 +145,11 @@ Resolution resolve_by(const R& rule, const Spectrum& spectrum, const TaskVector&
                       std::uint8_t angular) noexcept {
   const int m = spectrum.rows(), size = spectrum.size();
   Resolution out;
-  const double enough = detail::kExact * command.cwiseAbs().maxCoeff();  // a norm's squares overflow and vanish
+  const double enough = detail::kExact * command.cwiseAbs().maxCoeff();  // the squares in a norm overflow or vanish
   const SpectrumSummary summary(spectrum);
   const std::array<double, kMaxTask> parts = spectrum.along_u(command);
 
-  // Rows that no joint can move at all, of an m×n matrix with m > n.
+  // If m > n, no joint can move the tip along the u_i beyond the n-th.
   for (int i = size; i < m; ++i) {
     out.singular |= static_cast<std::uint8_t>(1u << i);
     if (std::abs(parts[static_cast<std::size_t>(i)]) > enough) out.exact = false;

@@ -9,10 +9,10 @@
 
 namespace sigmaik {
 
-/// Each direction clamped by what it moves the joints for what it moves the tip (Buss and Kim 2005), for
-/// velocities: their angle limit per update γ_max is a joint speed here. One end effector, whose twist counts
-/// as one target. Directions with σ_i ≤ 1e-12 σ_max are dropped. The answer depends on the basis chosen where
-/// singular values are equal, as the paper's does.
+/// Clamps each direction by the ratio of the joints' motion to the tip's motion (Buss and Kim 2005), for velocities:
+/// the paper's angle limit per update γ_max is a joint speed here. There is one end effector, whose twist counts as one
+/// target. Directions with σ_i ≤ 1e-12 σ_max are dropped. Where singular values are equal, the answer depends on the
+/// basis chosen, as in the paper.
 struct SelectivelyDampedLeastSquares {
   double max_speed = 0.7853981633974483;  ///< [rad/s] > 0: no joint is asked for more
 
@@ -41,8 +41,8 @@ struct SelectivelyDampedLeastSquares {
 
   /// Bound of every joint speed, of all directions together [rad/s].
   double speed_bound() const noexcept { return max_speed; }
-  /// max_speed · min(1, N_i/M_i), with N_i = |u_i| = 1 what direction i moves the tip, and M_i = Σ_j |v_ji| |J_j| / σ_i
-  /// what the joints move the tip on their own.
+  /// max_speed · min(1, N_i/M_i), where N_i = |u_i| = 1 is the motion of the tip along direction i, and
+  /// M_i = Σ_j |v_ji| |J_j| / σ_i is the sum of the tip's motions by each joint alone.
   double speed_bound(const Spectrum& spectrum, int i) const noexcept {
     double moved = 0.0;
     for (int j = 0; j < spectrum.cols(); ++j) {

@@ -16,7 +16,7 @@ namespace sigmaik::planning::costs {
 struct Collision {
   std::optional<DistanceField> field = std::nullopt;  ///< of the obstacles, in the axes of the arm's base
   std::optional<ArmSpheres> spheres = std::nullopt;   ///< none: ArmSpheres::along_links(chain)
-  double clearance = 0.05;                            ///< ε [m] > 0: what is farther costs nothing
+  double clearance = 0.05;                            ///< ε [m] > 0; larger distances cost nothing
   double weight = 1e4;                                ///< [1/m] > 0
 
   /// \throws Error where there is no field, or a parameter is out of its range
@@ -39,7 +39,7 @@ struct SelfCollision {
   }
 };
 
-/// weight · Σ_j ½ x_j², x_j the way by which joint j is nearer to a limit than `margin`, or beyond it.
+/// weight · Σ_j ½ x_j², x_j the distance by which joint j is nearer to a limit than `margin`, or beyond it.
 struct JointLimits {
   double margin = 0.1;  ///< [rad or m] ≥ 0
   double weight = 1.0;  ///< > 0
