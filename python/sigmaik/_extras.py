@@ -8,7 +8,7 @@ from ._core import Error
 
 __all__ = ["MissingPackage", "installed", "need"]
 
-#: What pip calls a module, where the two differ, or where a version is needed.
+#: pip's requirement for a module, where the requirement differs from the module's name.
 _REQUIREMENTS = {"distributed": "'dask[distributed]'", "mujoco": "'mujoco>=3'", "viser": "'viser>=1'"}
 
 
@@ -17,7 +17,7 @@ class MissingPackage(Error, ImportError):
 
 
 def need(*modules: str) -> None:
-    """Raises MissingPackage, with the command that installs them, where modules are not installed."""
+    """Raises MissingPackage where modules are not installed; the text has the command that installs these modules."""
     missing = [module for module in modules if not installed(module)]
     if not missing:
         return

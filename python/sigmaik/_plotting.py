@@ -1,4 +1,4 @@
-"""What all figures share. Needs matplotlib. No display is needed, and pyplot's global state is left alone."""
+"""Functions that all figures share. They need matplotlib but no display, and leave pyplot's global state alone."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .files import write_atomically
 
 __all__ = ["DASHES", "JOINT_COLOURS", "empty_figure", "limit_lines", "plain_axes", "save_figure"]
 
-#: Of joints from base to tip: the colours of Okabe and Ito, which most colour-blind people can tell apart, and more.
+#: Joints' colours, base to tip: those of Okabe and Ito, which most colour-blind people can tell apart, and more.
 JOINT_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7A5C3E", "#4D4D4D", "#7FBF3F")
 DASHES = ("-", (0, (5, 1.5)), (0, (2, 1)), (0, (6, 1, 1, 1)), (0, (1, 1)), (0, (8, 2)))
 
@@ -39,7 +39,7 @@ def plain_axes(axes: Axes, label: str | None = None, size: float = 9) -> None:
 
 
 def limit_lines(axes: Axes, top: float, label: str | None) -> None:
-    """Limits ±1, dashed, what is beyond them up to ±top, shaded; ticks have numbers only where there is a label."""
+    """Draws the limits ±1 dashed, and shades from there to ±top; ticks have numbers only where there is a label."""
     for sign in (-1.0, 1.0):
         axes.axhline(sign, color="0.25", linewidth=0.9, linestyle=(0, (4, 3)))
         axes.axhspan(sign, sign * top, color="0.93", zorder=0)

@@ -12,7 +12,7 @@ __all__ = ["write_atomically"]
 
 
 def write_atomically(file: pathlib.Path, write: Callable[[BinaryIO], None]) -> pathlib.Path:
-    """Writes a file beside its place and moves it there, so that nobody ever sees half of it."""
+    """Writes a temporary file in the same folder and renames the file, so that nobody ever sees half a file."""
     file.parent.mkdir(parents=True, exist_ok=True)
     handle, name = tempfile.mkstemp(dir=file.parent, prefix=f".{file.name}.")
     try:
@@ -20,7 +20,7 @@ def write_atomically(file: pathlib.Path, write: Callable[[BinaryIO], None]) -> p
             write(stream)
         umask = os.umask(0)
         os.umask(umask)
-        os.chmod(name, 0o666 & ~umask)  # mkstemp's files are for their owner only
+        os.chmod(name, 0o666 & ~umask)  # only their owner may read mkstemp's files
         os.replace(name, file)
     except BaseException:
         os.unlink(name)

@@ -1,13 +1,14 @@
 """How far from singular: indices of a Jacobian, and their gradients in the joints.
 
-All come from the singular values σ_1 ≥ … ≥ σ_m of J (m, n), 1 ≤ m ≤ 6, 1 ≤ n ≤ 16. Where n < m the missing ones are
-zero: such a task cannot be done whole. J may have a leading batch axis, (B, m, n): the result is (B,) then.
+All indices come from the singular values σ_1 ≥ … ≥ σ_m of J (m, n), 1 ≤ m ≤ 6, 1 ≤ n ≤ 16. Where n < m the missing
+singular values are zero, because the arm cannot do such a task completely. J may have a leading batch axis, (B, m, n);
+the result is then (B,).
 
-Lengths and angles mix in J. `length_scale` [m] says what length weighs as much as one radian, as in VelocitySolver;
+Lengths and angles mix in J. `length_scale` [m] is the length that weighs as much as one radian, as in VelocitySolver;
 rows from the fourth on count as angular.
 
-At an exact singularity, σ_m ≤ 1e-14 σ_1, where it is rounding, the condition number and the geometry-aware index are
-``inf``, not an exception.
+At an exact singularity (σ_m ≤ 1e-14 σ_1, where σ_m is rounding) the condition number and the geometry-aware index are
+``inf``; they raise no error.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ Index = Literal["manipulability", "condition_number", "min_singular_value", "geo
 """Name of an index."""
 
 DEFAULT_SCALE: float = _core.DEFAULT_SCALE
-"""k where nothing is known of the arm: what the largest eigenvalue of JJᵀ of a metre-sized arm stays below."""
+"""k where nothing is known of the arm: an upper bound of the largest eigenvalue of JJᵀ of a metre-sized arm."""
 
 
 def manipulability(J: ArrayLike, length_scale: float = 1.0) -> float | Array:  # noqa: N803
@@ -59,7 +60,7 @@ def geometry_aware(
     length_scale: float = 1.0,
 ) -> float | Array:
     """ξ = ‖log(Σ^{-1/2} JJᵀ Σ^{-1/2})‖_F² (Petrović et al., eqs. 8 to 12): squared distance of the manipulability
-    ellipsoid from that of Σ in the affine-invariant metric; inf at a singularity.
+    ellipsoid from the ellipsoid of Σ in the affine-invariant metric; inf at a singularity.
 
     k: a number, Σ = kI, so that ξ = Σ log²(σ_i²/k); or Σ (m, m) itself, symmetric positive definite. By default 6, as
     for an arm of a metre's reach; `reference_scale` finds the k of any chain.
@@ -78,8 +79,8 @@ def evaluate(
 ) -> float | Array:
     """An index of a chain's Jacobian at q (n,), or (B,) at q (B, n), without the GIL.
 
-    k: as for `geometry_aware`; by default `reference_scale(chain)`. The answers do not depend on their order or
-    `threads`.
+    k: as for `geometry_aware`; by default `reference_scale(chain)`. The answers do not depend on the order of the
+    configurations or on `threads`.
     """
     value = _evaluate(chain, q, index, k, length_scale, threads, gradients=False)[0]
     return float(value) if value.ndim == 0 else value
@@ -95,9 +96,9 @@ def gradient(
 ) -> Array:
     """Gradient (n,) [per rad or m] of an index at q (n,), or (B, n) at q (B, n), in closed form.
 
-    Always finite. Where the smallest singular value is zero, or repeated, its slope is that along the singular vectors
-    that the decomposition picked, one of several. Where an index is inf its gradient is zero: nothing points out of
-    there.
+    The gradient is always finite. Where the smallest singular value is zero or repeated, the gradient is one of several
+    slopes, along the singular vectors that the decomposition chose. Where an index is inf, its gradient is zero,
+    because no direction leads away from the singularity.
     """
     return _evaluate(chain, q, index, k, length_scale, threads, gradients=True)[1]
 

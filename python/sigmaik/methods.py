@@ -3,7 +3,7 @@
     sk.methods.ALL                          # ("jparse", "pinv", "dls", …)
     sk.methods.parse("jparse:gamma=0.2")    # JParse(gamma=0.2, …)
 
-A method's name is accepted as it stands wherever a method is: `sk.Servo(arm, "dls:damping=0.8")`.
+A method's name is accepted wherever a method is accepted: `sk.Servo(arm, "dls:damping=0.8")`.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class NamedMethod:
 _CLASSES: dict[str, type[Method]] = {rule.short_name: rule for rule in rules()}
 #: Short names of all methods. In lists of methods, "all" stands for them.
 ALL: tuple[str, ...] = tuple(_CLASSES)
-#: Short name to what it stands for.
+#: Short name to title.
 TITLES: dict[str, str] = {name: rule.title for name, rule in _CLASSES.items()}
 
 
@@ -48,7 +48,7 @@ def parse(spec: str, defaults: Mapping[str, Value] | None = None) -> Method:
     library. For jparse, gain=… sets gain_linear and gain_angular.
 
     Raises ArgumentError (an Error and a TypeError) where there is no such method, Error (a ValueError) where a
-    parameter or a value is wrong; both say what there is.
+    parameter or a value is wrong; both texts list the valid names.
     """
     name, _, arguments = spec.strip().partition(":")
     if name not in _CLASSES:
@@ -79,7 +79,7 @@ def parse_named(spec: str, defaults: Mapping[str, Value] | None = None) -> Named
 
 
 def parse_list(specs: Iterable[str], defaults: Mapping[str, Value] | None = None) -> list[NamedMethod]:
-    """Methods from several texts, each one spec, a comma list of them, or "all". Doubles are dropped.
+    """Methods from several texts, each one spec, a comma list of specs, or "all". Duplicates are dropped.
 
     A comma starts a new method where a method's name follows it, and a parameter otherwise:
     "jparse:gain_linear=2,gain_angular=2,dls:damping=0.8" is two methods.

@@ -1,7 +1,7 @@
 """The command `sigmaik`.
 
-Studies and commands are found by name (`sigmaik_lab.study`); only the one that is called is imported. Everything that
-is asked of a file or an option and is wrong there ends with one line on stderr and exit code 2.
+Studies and commands are found by name (`sigmaik_lab.study`); only the called study or command is imported. A wrong file
+or a wrong option ends the run with one line on stderr and exit code 2.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _parser(called: str) -> argparse.ArgumentParser:
-    """The parser, with the options of the command that is called; of the others it has names and a line of help."""
+    """The parser, with the options of the called command, and with names and a line of help of the other commands."""
     parser = argparse.ArgumentParser(
         prog="sigmaik", description="Velocity inverse kinematics at and near singularities."
     )
@@ -84,7 +84,7 @@ def _show_warning(
     file: TextIO | None = None,
     line: str | None = None,
 ) -> None:
-    """A warning of a model is for the user, not about a line of code."""
+    """Shows a warning of a model without a line of code, because such a warning is about the user's file."""
     if issubclass(category, sk.ModelWarning):
         print(f"sigmaik: warning: {message}", file=sys.stderr)
     else:

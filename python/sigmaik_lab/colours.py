@@ -25,7 +25,7 @@ _SWEEP = ("#9CC9E8", "#5BA7D6", "#2E86C1", "#1B5E9E", "#123A6B", "#081D40")
 
 
 def method_colour(method: NamedMethod) -> str:
-    """A colour a family, the same in all figures."""
+    """The colour of the method's family, the same in all figures."""
     return _COLOURS.get(method.family, "black")
 
 

@@ -15,7 +15,7 @@ __all__ = ["save_csv", "save_rows", "write_csv"]
 
 
 def write_csv(stream: BinaryIO, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
-    """Columns' names, then the rows, as UTF-8."""
+    """Writes the columns' names, then the rows, as UTF-8."""
     text = io.TextIOWrapper(stream, encoding="utf-8", newline="")
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(columns)
@@ -25,11 +25,11 @@ def write_csv(stream: BinaryIO, columns: Sequence[str], rows: Iterable[Sequence[
 
 
 def save_csv(file: str | pathlib.Path, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> pathlib.Path:
-    """Returns the file's path."""
+    """Writes a CSV file. Returns the file's path."""
     return write_atomically(pathlib.Path(file), lambda stream: write_csv(stream, columns, rows))
 
 
 def save_rows(rows: Sequence[Any], file: str | pathlib.Path) -> pathlib.Path:
-    """At least one dataclass, all of one kind: a column per field, a line per object, SI units. Returns the path."""
+    """Writes one or more dataclasses of one type: a column per field, a line per object, SI units. Returns the path."""
     columns = [field.name for field in dataclasses.fields(rows[0])]
     return save_csv(file, columns, ([getattr(row, column) for column in columns] for row in rows))

@@ -1,5 +1,5 @@
-"""The problem of `sk.planning.time_optimal` for a general solver, to compare with: direct transcription in CasADi,
-solved by IPOPT with MUMPS (extra `plan`). `time_optimal(solver="ipopt")` finds it by the entry point in
+"""The problem of `sk.planning.time_optimal` for a general solver, for comparison: direct transcription in CasADi,
+solved by IPOPT with MUMPS (extra `plan`). `time_optimal(solver="ipopt")` finds this module by the entry point in
 pyproject.toml."""
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ from sigmaik.planning.costs import ETA1, ETA2
 __all__ = ["plan"]
 
 TOLERATED = 1e-6
-"""What constraints may be broken by, or the plan has failed."""
+"""Largest violation of a constraint; a plan with a larger violation has failed."""
 DENSE = 10
 """Samples of a step where clearance is measured."""
 BEND = 0.6
-"""[rad] by which the first guess of a second start is bent."""
+"""[rad] Size of the bend in the first guess of a second start."""
 
 
 Sets: TypeAlias = SingularSets | None
@@ -39,7 +39,7 @@ Ends: TypeAlias = tuple[ArrayLike, ArrayLike, ArrayLike | None, ArrayLike | None
 
 @dataclass(frozen=True)
 class Objective:
-    """All that a solver object depends on, but for the arm. Hashable: solvers are built once for each."""
+    """Everything that a solver object depends on, except the arm. Hashable, because each solver is built only once."""
 
     avoid: str | None = None
     nodes: int = 30
@@ -53,17 +53,17 @@ class Objective:
 
 
 def plan(chain: Chain, sets: Sets, ends: Ends, options: Mapping[str, Any], avoid: Mapping[str, Any]) -> Trajectory:
-    """The motion from the straight line at an even speed, and, where it crosses a singular set that it need not and
-    `restarts` is not switched off, the better of it and of one from the other side, as in `TimeOptimal::plan`.
+    """The motion from the straight line at constant speed. Where this motion crosses a singular set without need, and
+    `restarts` is not switched off: the better of this motion and one from the other side, as in `TimeOptimal::plan`.
 
-    `options` and `avoid` are keywords of `time_optimal`; those that are no field of `Objective` do not count.
+    `options` and `avoid` are keywords of `time_optimal`; keywords that are no field of `Objective` do not count.
     """
     known = Objective.__dataclass_fields__
     objective = Objective(**{name: value for name, value in {**options, **avoid}.items() if name in known})
     if objective.avoid not in (None, "manipulability", "potential"):
         raise ValueError(f"avoid = {objective.avoid!r} must be None, 'manipulability' or 'potential'")
     if objective.avoid == "potential" and sets is None:
-        costs.Potential().bind_term(chain)  # says which arms are known
+        costs.Potential().bind_term(chain)  # the error names the known arms
     found = _one(chain, sets, objective, ends, None)
     near = found.clearance
     if (
@@ -120,7 +120,7 @@ def _trajectory(
 
 
 def _other_side(sets: SingularSets, crossing: Crossing, start: Array) -> Array:
-    """Direction (n,), of length 1: back to the start's side of a wall; for other sets to where the motion is not."""
+    """Direction (n,) of length 1: back to the start's side of a wall; at other sets, to the side without the motion."""
     i = sets.names.index(crossing.name)
     at = slice(sum(sets.codimensions[:i]), sum(sets.codimensions[: i + 1]))
     step = 1e-6 * np.eye(sets.dof)
@@ -137,7 +137,7 @@ def _other_side(sets: SingularSets, crossing: Crossing, start: Array) -> Array:
 
 
 def _along(found: Trajectory, sets: SingularSets, o: Objective) -> float:
-    """The objective with what is to be avoided counted all along the way; inf where the plan failed."""
+    """The objective, with the cost of avoidance counted along the whole way; inf where the plan failed."""
     if found.clearance is None:
         return math.inf
     dense = found.sample(found.clearance.t)[0]

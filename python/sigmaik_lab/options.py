@@ -44,7 +44,7 @@ def add_arm(parser: argparse._ActionsContainer, default: str = "ufactory_xarm7",
 
 
 def add_arms(parser: argparse._ActionsContainer, default: str, text: str = "") -> None:
-    """The same, for `open_arms`: --robot takes a comma list."""
+    """The options of `add_arm` for `open_arms`: --robot takes a comma list."""
     parser.add_argument(
         "--robot", default=default, metavar="LIST", help=f"shipped arms or URDF files{text} (%(default)s)"
     )
@@ -52,7 +52,7 @@ def add_arms(parser: argparse._ActionsContainer, default: str, text: str = "") -
 
 
 def add_arm_argument(parser: argparse._ActionsContainer) -> None:
-    """The same, for `open_arm`, with the arm as an argument and not an option."""
+    """The options of `add_arm` for `open_arm`, with the arm as an argument and not an option."""
     parser.add_argument("robot", metavar="ARM_OR_URDF", help=_ROBOT)
     _add_links(parser)
 
@@ -63,7 +63,7 @@ def _add_links(parser: argparse._ActionsContainer) -> None:
 
 
 def open_arm(args: argparse.Namespace) -> sk.robots.Arm:
-    """The arm of `add_arm`. ValueError where there is none of that name, or the command takes another one only."""
+    """The arm of `add_arm`. ValueError where no arm has this name, or where the command takes another arm only."""
     only = getattr(args, "only_arm", None)
     if only is not None and (args.robot, args.base, args.tip) != (only[0], None, None):
         raise ValueError(f"--robot is {only[0]} here, from its root to its flange: {only[1]}")
@@ -71,7 +71,7 @@ def open_arm(args: argparse.Namespace) -> sk.robots.Arm:
 
 
 def open_arms(args: argparse.Namespace, every: Iterable[str] = ()) -> list[sk.robots.Arm]:
-    """The arms of `add_arms`. every: those that "all" stands for. ValueError where there is none of a name."""
+    """The arms of `add_arms`. every: the arms that "all" stands for. ValueError where no arm has one of the names."""
     listed = list(every) if args.robot == "all" else args.robot.split(",")
     return [sk.robots.open(robot, args.base, args.tip) for robot in listed]
 
@@ -89,7 +89,7 @@ def add_output(
     """The options --out, --format and --no-plot, for `output.show`.
 
     folder: default of --out
-    formats: of time series, where there are any; "none" is one more. default: the first
+    formats: of time series, where the study has any; "none" is one more format. default: the first format
     plots: whether there are pictures
     """
     out = parser.add_argument_group("what is written")
@@ -141,7 +141,7 @@ def configuration(option: str, text: str, chain: sk.Chain, home: Array) -> Array
 
 
 def numbers(option: str, text: str) -> list[float]:
-    """A comma list of finite numbers. ValueError where one is none."""
+    """A comma list of finite numbers. ValueError where an entry is no finite number."""
     values = []
     for part in text.split(","):
         try:
@@ -155,7 +155,7 @@ def numbers(option: str, text: str) -> list[float]:
 
 
 def choices(what: str, text: str, known: Iterable[str]) -> list[str]:
-    """A comma list of known names. ValueError where one is not known."""
+    """A comma list of known names. ValueError where a name is not known."""
     chosen = text.split(",")
     for name in chosen:
         if name not in known:

@@ -18,7 +18,7 @@ __all__ = ["PhysicsSettings", "add_physical_arm", "physics_settings", "simulatio
 
 @dataclass(frozen=True)
 class PhysicsSettings:
-    """What the arm is like, and what closes the loop."""
+    """The properties of the arm and of its drives, and the feedback of the loop."""
 
     actuation: Literal["velocity", "torque"] = "velocity"  #: of the drives; computed torque drives "torque"
     feedback: Literal["reference", "measured"] = "reference"
@@ -32,13 +32,13 @@ class PhysicsSettings:
     velocity_noise: float = 0.0  #: [rad/s or m/s]
     delay: int = 0  #: of measurements, in periods
     trip: float = (
-        5.0  #: where a joint is faster than so many times its limit the drives trip: the arm stands from then on
+        5.0  #: where a joint is faster than this multiple of its limit the drives trip: the arm stands from then on
     )
     seed: int = 0
 
 
 def add_physical_arm(group: argparse._ActionsContainer) -> None:
-    """What the arm in physics is like."""
+    """The options of an arm in physics."""
     group.add_argument(
         "--friction",
         type=float,
@@ -50,7 +50,7 @@ def add_physical_arm(group: argparse._ActionsContainer) -> None:
     for option, unit, text in (
         ("--payload", "KG", "a point mass at the tip, of which the drives do not know"),
         ("--noise", "RAD", "standard deviation of measured positions"),
-        ("--velocity-noise", "RAD/S", "and of velocities"),
+        ("--velocity-noise", "RAD/S", "standard deviation of measured velocities"),
     ):
         group.add_argument(option, type=float, default=0.0, metavar=unit, help=f"{text} (%(default)g)")
     group.add_argument(
@@ -74,7 +74,7 @@ def physics_settings(
     actuation: Literal["velocity", "torque"],
     feedback: Literal["reference", "measured"] = "reference",
 ) -> PhysicsSettings:
-    """What `add_physical_arm` has read."""
+    """The settings from the options of `add_physical_arm`."""
     return PhysicsSettings(
         actuation=actuation,
         feedback=feedback,
@@ -91,7 +91,7 @@ def physics_settings(
 
 
 def simulation(chain: sk.Chain, p: PhysicsSettings, actuation: Literal["velocity", "torque"]) -> Simulation:
-    """The arm that the settings describe. ValueError where one is out of its range, or the arm has no inertias."""
+    """The arm that the settings describe. ValueError where a setting is out of its range or the arm has no inertias."""
     effort, speed = np.array(chain.limits.effort), np.array(chain.limits.velocity)
     dry = np.zeros(chain.dof)
     if p.friction:

@@ -16,7 +16,7 @@ __all__ = ["parsed", "run_study"]
 
 
 def parsed(name: str, words: list[str]) -> argparse.Namespace:
-    """What a study's options are where these words are given."""
+    """A study's options, read from the words of a command line."""
     study = find_study(name)
     assert study is not None
     parser = argparse.ArgumentParser(prog=f"sigmaik {name}")
@@ -29,7 +29,7 @@ def run_study(name: str, args: argparse.Namespace) -> int:
     study = find_study(name)
     assert study is not None
     if not getattr(args, "no_plot", True):
-        need("matplotlib")  # told before the run, and not after
+        need("matplotlib")  # a missing package ends the command before the run, and not after
     with _closing(iter(study.load(args))) as experiments:
         for experiment in experiments:
             with output.progress(name) as progress:
@@ -40,7 +40,7 @@ def run_study(name: str, args: argparse.Namespace) -> int:
 
 @contextlib.contextmanager
 def _closing(experiments: Iterator[Any]) -> Iterator[Iterator[Any]]:
-    """A generator's `finally` runs where a run is interrupted."""
+    """Closes a generator, so that its `finally` runs where a run is interrupted."""
     try:
         yield experiments
     finally:

@@ -35,13 +35,13 @@ class Progress(Protocol):
 class Study(Protocol[E, R]):
     """The functions of a study's `study.py`.
 
-    The folder's `__init__.py` has a docstring and nothing else: the first line is what `sigmaik --help` shows, the rest
-    what `sigmaik NAME --help` does. Files beside `study.py` are the study's own: `experiment.py` computes, `table.py`
-    makes text tables, and `figure.py` draws.
+    The folder's `__init__.py` has a docstring and nothing else: `sigmaik --help` shows the first line, and `sigmaik
+    NAME --help` shows the rest. Files beside `study.py` are the study's own: `experiment.py` computes, `table.py` makes
+    text tables, and `figure.py` draws.
     """
 
     def options(self, parser: argparse.ArgumentParser) -> None:
-        """Adds the study's options; those of arm and output with `sigmaik_lab.options`."""
+        """Adds the study's options; `sigmaik_lab.options` adds those of arm and output."""
 
     def load(self, args: argparse.Namespace) -> Iterable[E]:
         """The experiments that the options ask for, each of which is run and reported before the next one.

@@ -2,7 +2,7 @@
 
 import sigmaik as sk
 
-#: Every rule with the parameters that it comes with, and the others of their modes.
+#: Every rule with its default parameters, and the other modes of the rules.
 METHODS = [
     *(sk.methods.parse(name) for name in sk.methods.ALL),
     sk.AdaptiveDampedLeastSquares("manipulability"),

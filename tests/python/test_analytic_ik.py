@@ -19,7 +19,7 @@ def kuka():
 
 
 def apart(a, b):
-    """Largest difference of joints, whole turns apart being the same."""
+    """Largest difference of joints; whole turns do not count."""
     difference = np.asarray(a) - b
     return np.max(np.abs(difference - 2 * np.pi * np.round(difference / (2 * np.pi))), axis=-1)
 
@@ -126,7 +126,7 @@ def test_nearest_prefers_what_is_within_limits(kuka):
     lower[4], upper[4] = -2.0, 0.0  # the wrist has to turn over
     found = sk.AnalyticIk(kuka.with_limits(lower=lower, upper=upper)).nearest(T, q)
     np.testing.assert_allclose(found, q + [0, 0, 0, -np.pi, -1.8, np.pi], atol=1e-12)
-    lower[4], upper[4] = -0.5, 0.5  # neither way
+    lower[4], upper[4] = -0.5, 0.5  # the limits exclude both angles of axis 5
     ik = sk.AnalyticIk(kuka.with_limits(lower=lower, upper=upper))
     np.testing.assert_allclose(ik.nearest(T, q), q, atol=1e-12)
     branches = ik.branches(T)
@@ -153,7 +153,7 @@ def test_wrist(kuka):
     assert ik.singular(T) == ("wrist",)
     assert sorted(b.singular for b in ik.branches(T)) == [()] * 6 + [("wrist",)]
     np.testing.assert_allclose(ik.nearest(T, q), q, atol=1e-12)
-    # The sum is what the pose gives.
+    # The pose determines the sum of joints 4 and 6 only.
     found = ik.nearest(T, q + [0, 0, 0, 0.5, 0, 0])
     np.testing.assert_allclose(found, q + [0, 0, 0, 0.5, 0, -0.5], atol=1e-12)
 

@@ -64,7 +64,7 @@ def test_example_2_starts_in_the_singularity_and_moves_where_it_lost_a_direction
     m = motion(2)
     u, sigma, _ = np.linalg.svd(m.chain.jacobian(m.start))
     assert sigma[-1] < 1e-12
-    # Keeping the orientation while axis 1 turns takes a rotation about z, and part of it is the one lost.
+    # To keep the orientation while axis 1 turns takes a rotation about z, and the arm has lost a part of this rotation.
     lost = u[:, -1]
     assert abs(lost[5]) == pytest.approx(math.cos(math.radians(20.0)) * np.linalg.norm(lost[3:]), rel=1e-9)
 
@@ -118,7 +118,7 @@ def test_limits_are_reached_and_never_broken(example, variant, dt):
 @pytest.mark.parametrize("example", axis5.EXAMPLES)
 @pytest.mark.parametrize("variant", ["constrained", "no-beta", "scaled"])
 def test_position_error_stays_zero(example, variant):
-    # What two linearisations leave: it grows with dt⁴ or so.
+    # The error that two linearisations leave grows about with dt⁴.
     for dt, least in ((1e-3, 2e-9), (4e-3, 2e-7), (12e-3, 5e-6)):
         row = summary(example, variant, dt)
         assert row.max_position_error < least
@@ -145,7 +145,7 @@ def test_without_beta_the_joints_oscillate(example):
         assert damped.speed_variation[j] < 0.4 * free.speed_variation[j]
         assert damped.rms_jerk[j] < 0.5 * free.rms_jerk[j]
         assert damped.reversals[j] < 0.6 * free.reversals[j]
-    # There and back by the speed limit, and no more: axis 4 oscillates not at all.
+    # The speed rises to its limit and falls again once there and once back: axis 4 does not oscillate.
     if example == 1:
         speed = motion(1).chain.limits.velocity[3]
         assert damped.speed_variation[3] == pytest.approx(4.0 * speed, rel=0.1)
@@ -255,7 +255,7 @@ def test_command(capsys, tmp_path, monkeypatch):
     figure = pytest.importorskip("matplotlib.figure")
     from sigmaik_lab.axis5 import figure as axis5_figure
 
-    draw = axis5_figure.axis_figure  # one is enough: they take a second each
+    draw = axis5_figure.axis_figure  # one figure is enough: each figure takes a second
     monkeypatch.setattr(axis5_figure, "axis_figure", lambda t, j: draw(t, j) if j == 3 else figure.Figure())
     assert main(["axis5", "--example", "2", "--out", str(tmp_path)]) == 0
     printed = capsys.readouterr().out.splitlines()

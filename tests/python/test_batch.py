@@ -145,7 +145,7 @@ def test_other_threads_run_meanwhile(threads):
         ticks += 1
     took = time.perf_counter() - start
     worker.join()
-    # With the GIL held there would be one or two.
+    # With the GIL held there would be one or two ticks.
     assert ticks > 5, f"{ticks} ticks in {took} s"
 
 

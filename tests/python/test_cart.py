@@ -254,7 +254,7 @@ def test_tip_between_samples():
     assert tip % 1.0 != 0.0
     assert tip in m.corners
     assert m.sample(tip / 59) == pytest.approx(0.0, abs=1e-9)
-    # A chord over the last border, not the samples alone.
+    # Clearance and energy belong to the chords through the corners, and not to the samples alone.
     assert m.clearance == pytest.approx(0.2, abs=2e-3)
     assert m.energy == pytest.approx(np.sum(np.diff(m.corner_x) ** 2 / np.diff(m.corners)))
 
@@ -506,7 +506,7 @@ def test_trajectory_refusals():
     refused("via", via=[])
     refused("one line", via=[0.5 * (e.poses[0] + e.poses[1])[:3, 3]])
     refused("accelerates", profile="smooth", max_acceleration=1e-6)
-    refused("cannot follow", radius=0.1)  # the wrist would have to be nearer than the shoulder lets it
+    refused("cannot follow", radius=0.1)  # the wrist would have to be nearer than the shoulder allows
 
 
 # --- the command

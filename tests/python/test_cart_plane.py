@@ -1,5 +1,5 @@
 """A cart with two linear axes against closed forms, dynamic programming on a grid, a general solver, and the exact law
-of one."""
+of one axis."""
 
 import math
 
@@ -40,7 +40,7 @@ def turns(c, path):
 
 
 def length_round(a, b, turn, r):
-    """Of tangent, arc, tangent round a disc, or of the straight line where that is clear of it."""
+    """Length of tangent, arc and tangent round a disc, or of the straight line where the line is clear of the disc."""
     la, lb = (math.sqrt(v @ v - r * r) for v in (a, b))
     arc = abs(turn) - math.atan2(la, r) - math.atan2(lb, r)
     return float(np.linalg.norm(b - a)) if arc <= 0.0 else la + r * arc + lb
@@ -72,13 +72,13 @@ def test_uniform_flange_has_the_closed_form(seed):
 
 
 def optimal(m, r, outer=math.inf):
-    """Karush, Kuhn and Tucker: the cart bends only where it touches, away from the disc."""
+    """Karush, Kuhn and Tucker: the path bends only where it touches the disc, and away from the disc."""
     c, d = m.xy, m.xy - m.flange_xy
     force = 2 * c[1:-1] - c[2:] - c[:-2]
     distance = np.linalg.norm(d, axis=1)
     n = d[1:-1] / distance[1:-1, None]
     normal = np.sum(force * n, axis=1)
-    # A kink would be of a step's size.
+    # A kink would be as large as a step.
     unit = 1e-4 * math.sqrt(m.energy / len(c))
     assert np.abs(force - normal[:, None] * n).max() < unit
     touching, away = distance[1:-1] < r * (1 + 1e-6), distance[1:-1] > outer - 1e-6 * r
@@ -138,7 +138,7 @@ def test_a_pinned_axis_is_the_exact_law(seed):
         except CartError:
             continue
         if np.any(one.corners % 1.0):
-            continue  # it knows tips between samples
+            continue  # the law of one axis knows tips between samples
         pinned = cart_motion_plane(path, (start, 0.0), (end, 0.0), r, y_range=(0.0, 0.0), turn=one.turn)
         assert pinned.energy == pytest.approx(one.energy, rel=1e-6)
         assert np.abs(pinned.xy[:, 0] - one.x).max() < 1e-5

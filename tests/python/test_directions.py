@@ -1,4 +1,4 @@
-"""What a cycle says of the singular directions: the rule's, as twists in base axes, for every method and task."""
+"""The singular directions that a cycle reports: the rule's, as twists in base axes, for every method and task."""
 
 import time
 
@@ -26,7 +26,7 @@ every_method = pytest.mark.parametrize("method", METHODS, ids=repr)
 
 
 def tasks(rng, count):
-    """Arm, q, length scale, mask and frame; half of the arms are stretched out, or near that."""
+    """Arm, q, length scale, mask and frame; half of the arms are stretched out, or nearly so."""
     names = ("ufactory_xarm7", "franka_panda", "ur10", "kuka_lbr_iiwa_14_r820")
     for k in range(count):
         arm = sk.robots.load(names[k % len(names)])
@@ -72,7 +72,7 @@ def test_they_are_those_of_the_rule_in_base_axes(method):
         scaled = directions * np.array([[1.0]] * 3 + [[length_scale]] * 3)
         np.testing.assert_allclose(scaled.T @ scaled, np.eye(k), atol=1e-12)
 
-        # The same space as numpy's, where its directions are those of singular values that are well apart.
+        # The directions span the same space as numpy's, where the singular values are well apart.
         u, sigma, _ = np.linalg.svd(to_rows @ jacobian)
         sigma = np.pad(sigma, (0, len(u) - len(sigma)))
         inside, outside = sigma[step.singular], sigma[~step.singular]

@@ -1,11 +1,11 @@
 """Against the J-PARSE authors' own package (PyPI: jparse-robotics), wherever it is defined.
 
-Its JParseCore computes J_s⁺ J_p J_p⁺ + J_s⁺ U_s Φ U_sᵀ K: K weighs the command's rows, as here.
-It is not defined
+The package's JParseCore computes J_s⁺ J_p J_p⁺ + J_s⁺ U_s Φ U_sᵀ K: K weighs the command's rows, as here.
+The package's answer is not defined
 
-- where a direction that it drops survives in the rounding of its products: numpy's pinv then inverts it;
-- for γ = 1, which it refuses;
-- in its null space where σ_i = 0, as there v_i is whatever LAPACK gives.
+- where a dropped direction survives in the rounding of the products: numpy's pinv then inverts this direction;
+- for γ = 1, which the package refuses;
+- in its null space where σ_i = 0, because v_i is then any vector that LAPACK gives.
 """
 
 import numpy as np

@@ -21,7 +21,7 @@ def test_box_against_scipy():
     rng = np.random.default_rng(0)
     for _ in range(400):
         n = rng.integers(1, 13)
-        m = rng.integers(n, 20)  # one answer
+        m = rng.integers(n, 20)  # at least n rows: the answer is unique
         A, b = rng.normal(size=(m, n)), 3 * rng.normal(size=m)
         lower, upper = bounds(rng, n)
         answer = sk.least_squares(A, b, lower=lower, upper=upper)
@@ -33,7 +33,7 @@ def test_box_against_scipy():
 
 
 def test_box_of_short_rank_against_scipy():
-    """Where many answers have one residual, ours has that residual and is the shortest of those tried."""
+    """Where many answers have one residual, our answer has this residual and is the shortest of the answers tried."""
     rng = np.random.default_rng(1)
     for _ in range(300):
         n = rng.integers(2, 13)

@@ -36,7 +36,7 @@ def drive(robot: str, scenario: str, variant: str, **changes: float) -> list[ex.
 @pytest.mark.parametrize("scenario", ex.SCENARIOS)
 @pytest.mark.parametrize("variant", ["redistribute", "position first", "scale"])
 def test_no_limit_is_broken(robot, scenario, variant):
-    """By differences of what was commanded, which know nothing of how it was limited."""
+    """By differences of the commands, independently of the way in which the commands were limited."""
     for trace in drive(robot, scenario, variant):
         limits = trace.experiment.chain.limits
         rate = trace.experiment.settings.rate
@@ -74,7 +74,7 @@ def test_without_limits_and_clamped_they_are():
 
 
 def test_redistribution_reaches_what_scaling_does_not():
-    """Seven joints: with one at its limit, the others can do it."""
+    """With one of seven joints at its limit, the other joints can reach the pose."""
     chosen = ("joint2 upper", "joint3 lower", "joint5 upper", "joint7 upper")
     experiment = load(pace=0.7)
     for trial in experiment.trials["beyond limits"]:
@@ -90,7 +90,7 @@ def test_redistribution_reaches_what_scaling_does_not():
 
 
 def test_the_rule_alone_is_what_the_servo_does_without_limits():
-    """The reference against which everything is measured, which is not the servo's own account."""
+    """The reference for all measurements, computed independently of the servo's own report."""
     for scenario in ex.SCENARIOS:
         for trace in drive("ufactory_xarm7", scenario, "none"):
             np.testing.assert_allclose(trace.achieved, trace.rule, rtol=0, atol=1e-9 * (1 + np.abs(trace.rule).max()))

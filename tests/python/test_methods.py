@@ -1,4 +1,4 @@
-"""Methods by name, and the one class that all of them are of."""
+"""Methods by name, and the base class of all methods."""
 
 import inspect
 import re

@@ -1,4 +1,4 @@
-"""What set-up warns of: models that lack limits or contradict themselves, and starts that are rather in degrees."""
+"""Warnings of set-up: models that lack limits or contradict themselves, and starts that are probably in degrees."""
 
 import warnings
 

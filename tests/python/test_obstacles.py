@@ -1,4 +1,4 @@
-"""Obstacles, arms as spheres, and what their nearness costs."""
+"""Obstacles, arms as spheres, and the costs of small distances between them."""
 
 import importlib.util
 import math
@@ -67,7 +67,7 @@ def test_distances_of_shapes_against_their_surfaces():
             points = rng.uniform(-0.8, 0.8, (100, 3))
             got = shape.distance(points)
             nearest = np.array([np.linalg.norm(surface - p, axis=1).min() for p in points])
-            # Sampled surfaces are further away, by the gaps between the samples at most.
+            # Sampled surfaces are farther away, by the gaps between the samples at most.
             assert np.all(np.abs(got) <= nearest + 1e-12)
             assert np.all(nearest - np.abs(got) < 0.02)
             assert np.array_equal(got < 0.0, inside(points))
@@ -151,7 +151,7 @@ def test_occupancy_grid():
     assert np.abs(error).max() < 1.3 * cell
     beside = np.array([[0.35, 0.0, 0.0], [0.0, 0.4, 0.02], [0.02, 0.0, -0.3], [0.02, 0.0, 0.04]])
     assert obstacles.distance(beside) == pytest.approx(box.distance(beside), abs=1e-6)
-    # Any shape: by no more than the voxels are wrong by, and those of the grid.
+    # Any shape: the error is at most the error of the voxels plus the error of the grid.
     ball = P.Sphere(radius=0.25, center=(0.05, 0.02, -0.03))
     obstacles = P.Obstacles.from_occupancy(ball.distance(centers) < 0.0, (-12 * cell,) * 3, cell)
     assert np.abs(obstacles.distance(points) - ball.distance(points)).max() < 1.5 * cell
@@ -168,7 +168,7 @@ def test_scipy_missing_names_the_command(monkeypatch):
     )
     with pytest.raises(sk.Error, match="pip install scipy"):
         P.Obstacles.from_occupancy(np.eye(3)[:, :, None] * [1, 0], (0, 0, 0), 0.1)
-    P.Obstacles([P.Sphere(0.1, (0, 0, 0))])  # needs none
+    P.Obstacles([P.Sphere(0.1, (0, 0, 0))])  # shapes need no SciPy
 
 
 @pytest.fixture(scope="module")

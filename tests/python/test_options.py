@@ -1,4 +1,4 @@
-"""The keywords of what takes options: told once in C++, and so the same in signature, docstring, stub and errors."""
+"""Keywords of options: declared once in C++, and therefore the same in signature, docstring, stub and errors."""
 
 import ast
 import inspect
@@ -11,7 +11,7 @@ import sigmaik as sk
 
 ARM = "ur10"
 
-# What takes options, what it needs before them, and a misspelt one with what was meant.
+# Classes with options: the arguments before the options, a misspelt option, and the option that was meant.
 TAKES_OPTIONS = {
     "Servo": (lambda arm: (arm, sk.JParse()), "posture_gian", "posture_gain"),
     "ConstrainedIk": (lambda arm: (arm,), "torque_limit", "torque_limits"),
@@ -29,7 +29,7 @@ def started(arm):
 
 
 def signature(name):
-    """The arguments in the stub, but for self."""
+    """The arguments in the stub, without self."""
     stub = Path(sk.__file__).with_name("_core.pyi").read_text(encoding="utf-8")
     (body,) = [n.body for n in ast.parse(stub).body if isinstance(n, ast.ClassDef) and n.name == name]
     (init,) = [n for n in body if isinstance(n, ast.FunctionDef) and n.name == "__init__"]
@@ -114,7 +114,7 @@ def test_a_word_that_is_no_choice(options, text):
 
 
 def test_defaults_of_the_stub_are_those_that_hold():
-    """Written out, each at its default, they make the same servo."""
+    """All options, each written out with its default, make the same servo."""
     arm, home = sk.robots.load(ARM), sk.robots.home(ARM)
     stub = signature("Servo").args
     written = {}

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 import sigmaik as sk
 
 METHODS = [*all_methods.METHODS, sk.PseudoInverse(0.05), sk.AdaptiveDampedLeastSquares(relative=False)]
-# Those that do in full what they take for regular.
+# Rules that do the command in full along the directions that they treat as regular.
 EXACT = [m for m in METHODS if not isinstance(m, (sk.DampedLeastSquares, sk.SelectivelyDampedLeastSquares))]
 
 
@@ -105,7 +105,7 @@ def test_the_base_frame_does_not_matter():
             a = sk.VelocitySolver(method, 0.3).solve(one.jacobian(q), x, posture)
             b = sk.VelocitySolver(method, 0.3).solve(other.jacobian(q), np.kron(np.eye(2), R) @ x, posture)
             sigma = a.singular_values
-            # Too close to a singularity or a threshold, rounding has its say.
+            # Too close to a singularity or a threshold, rounding decides.
             if on_edge(a, 0.05, 0.1, 0.2) or sigma[-1] < 1e-6 * sigma[0]:
                 continue
             np.testing.assert_allclose(a.qdot, b.qdot, rtol=0, atol=1e-7 * (1 + np.linalg.norm(a.qdot)))
@@ -233,7 +233,7 @@ SMOOTH = [
 
 @pytest.mark.parametrize("method", SMOOTH, ids=repr)
 def test_smooth_rules_are_smooth_along_an_arms_motion(method):
-    """Twice as fine a path has steps of half the length: no jump hides anywhere on it."""
+    """On a path with half the step, the steps of the answer have half the length: the answer has no jump anywhere."""
     for name in ("ufactory_xarm7", "puma560", "kinova_gen3_7dof"):
         chain = sk.robots.load(name)
         rng = np.random.default_rng(11)

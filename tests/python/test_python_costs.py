@@ -1,4 +1,4 @@
-"""Costs written in Python: asked in batches by the planners, which pass on what they raise."""
+"""Costs written in Python: planners ask for values in batches, and pass on the exceptions of a cost."""
 
 import gc
 import re
@@ -33,7 +33,7 @@ class Slopes(Values):
 
 
 class Answers:
-    """Answers with what it is told to, or raises it."""
+    """Returns the given answers, or raises them."""
 
     def __init__(self, value=None, gradient=None):
         self.answers = (value, gradient)
@@ -144,7 +144,7 @@ def test_what_it_raises_comes_through(planner):
     later = iter([np.zeros(19)])
     with pytest.raises(StopIteration):
         planner(arm, *ends[0], costs=(Answers(lambda q: next(later)),))
-    # Nothing is left behind.
+    # A failed plan leaves no trace.
     assert planner(arm, *ends[0]).q == pytest.approx(planner(arm, *ends[0], costs=(Answers(),)).q, abs=1e-9)
 
 

@@ -109,7 +109,7 @@ def test_projections_stay_out_of_the_singular_region_and_off_the_target_in_it(me
 
 
 def test_safety_alone_commands_motion_that_the_arm_cannot_do():
-    # It never comes to rest at the unreachable target, where J-PARSE without a posture does.
+    # The safety rule never comes to rest at the unreachable target, where J-PARSE without a posture comes to rest.
     assert rows(XARM, LINE, "safety", posture_gain=0.0)[0].rest_speed > 1.0
     assert rows(XARM, LINE, "jparse", posture_gain=0.0)[0].rest_speed < 0.01
 

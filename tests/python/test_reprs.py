@@ -1,4 +1,4 @@
-"""What print() shows of a public object is short and says something."""
+"""print() of a public object is short and informative."""
 
 import enum
 import inspect

@@ -61,7 +61,7 @@ def well_posed(J, threshold=0.1, least=1e-5):
     """Whether a rule that jumps at the threshold has a well-defined answer.
 
     Directions of singular values closer than `least` mix by rounding/least. That does not matter where a rule
-    treats them alike, but does on either side of a jump.
+    treats these directions alike, but matters where they are on different sides of a jump.
     """
     sigma = np.linalg.svd(J, compute_uv=False)
     sigma = sigma / sigma[0]
@@ -209,7 +209,7 @@ def test_rule_of_the_table(name):
         if name in JUMPS and not well_posed(J, JUMPS[name], 1e-5 if JUMPS[name] > 1e-5 else 1e-14):
             continue
         if name == "safety" and np.linalg.cond(J) > 1e5:
-            continue  # through σ_i = 0 its answer changes sign, and at it depends on the directions chosen
+            continue  # at σ_i = 0 the rule's answer changes sign, and depends on the chosen directions
         compared += 1
         solver = sk.VelocitySolver(method(m))
         task, rest = by_singular_direction(J, twist, posture, rule(m))
@@ -333,7 +333,7 @@ def test_ablations_are_the_papers_matrix_forms():
             (sk.JacobianSafetyProjection(gamma), pinv_s @ J_p @ pinv_p, eye - pinv_s @ J_s),
         ]:
             if sigma[-1] < 1e-5 * sigma[0]:
-                # u_i and v_i of σ_i = 0 are any: only what does not use them can be compared.
+                # u_i and v_i of σ_i = 0 are arbitrary: only answers that do not use them can be compared.
                 if isinstance(method, sk.JacobianProjection):
                     qdot = sk.VelocitySolver(method).solve(J, twist, posture).qdot
                     np.testing.assert_allclose(qdot, matrix @ twist + inverse_of @ posture, rtol=0, atol=atol)
@@ -370,7 +370,7 @@ def test_sdls_is_buss_and_kims():
         m = rng.integers(1, 7)
         n = rng.integers(1, 17)
         k = min(m, n)
-        sigma = np.cumprod(rng.uniform(0.1, 0.9, k)) * 10 ** rng.uniform(-1, 1)  # apart: the basis matters to it
+        sigma = np.cumprod(rng.uniform(0.1, 0.9, k)) * 10 ** rng.uniform(-1, 1)  # well apart: SDLS depends on the basis
         if rng.random() < 0.3:
             sigma[-1] = 0.0
         J = with_singular_values(rng, m, n, sigma)

@@ -107,7 +107,7 @@ def test_scaling_keeps_the_direction(arm):
 
 
 def test_redistribution_says_what_it_misses(arm):
-    """LIMITED where the tool misses more than a ten-thousandth of the rule's twist; else others took over."""
+    """LIMITED where the tool misses more than a ten-thousandth of the rule's twist; else other joints took over."""
     chain, home = arm
     rng = np.random.default_rng(13)
     slow = chain.with_limits(velocity=rng.uniform(0.05, 0.5, chain.dof))
@@ -195,9 +195,9 @@ def test_no_kick_at_the_start(arm):
 
 
 def test_from_an_exact_singularity(arm):
-    """At q = 0, in all twelve directions: what the arm can do it does, what it cannot it calls damped.
+    """At q = 0, in all twelve directions: the servo does every motion that the arm can do, and calls others damped.
 
-    (q = 0 is outside the position limits of some.)
+    (q = 0 is outside the position limits of some arms.)
     """
     chain, _ = arm
     zero = np.zeros(chain.dof)
@@ -254,7 +254,7 @@ def test_targets_that_jump_and_are_out_of_reach(method):
 def test_out_of_reach_and_back():
     """The xArm7's line: out, stretched and still, and back to within a micrometre.
 
-    Without position limits: on its way back the elbow may fold to the side that it has no room on, see
+    Without position limits: on its way back the elbow may fold to the side where it has no room, see
     docs/limits.md.
     """
     chain, home = sk.robots.load("ufactory_xarm7"), sk.robots.home("ufactory_xarm7")

@@ -141,7 +141,7 @@ def test_hold_under_gravity_with_what_the_drives_do_not_know(panda):
         for _ in range(1500):
             simulation.step(np.zeros(7))
         assert np.abs(simulation.q - home).max() < drop
-        assert np.abs(simulation.qdot).max() < 1e-2  # the integral holds whatever it is
+        assert np.abs(simulation.qdot).max() < 1e-2  # the integral holds the arm against any unknown load
 
 
 # --- what is measured
@@ -195,7 +195,7 @@ def test_computed_torque_with_the_true_model(panda, plan):
         assert done.saturated == 0.0
         assert done.final_error < 1e-6
         assert done.max_effort < 1.0
-    # What is left is the torque's hold over a period: of first order in it.
+    # The remaining error comes from holding the torque over a period, and is of first order in the period.
     assert errors[1] < 5e-4
     assert errors[0] / errors[2] == pytest.approx(4.0, rel=0.4)
     velocity = execute(Simulation(arm), plan)
@@ -210,7 +210,7 @@ def test_payload_unknown_and_known(panda, plan):
         for control in (None, sk.ComputedTorque(arm, payload=load))
     )
     assert known.max_error < 5e-4
-    # At rest e = d/ω², M d the torque that is missing.
+    # At rest e = d/ω², where M d is the missing torque.
     end = plan.q[-1]
     loaded, bare = sk.Dynamics(arm, payload=load), sk.Dynamics(arm)
     q = unknown.q[-1]
@@ -323,7 +323,7 @@ def test_reaching_in_physics(reaching, actuation, feedback):
     method = parse_method("jparse", reaching.settings)
     settings = PhysicsSettings(actuation=actuation, feedback=feedback)
     run = physics.run_physics(reaching, method, True, settings)
-    # Without physics it is what `run` gives, to the last digit.
+    # Without physics the answer is that of `run`, to the last digit.
     alone = ex.run(reaching, method, True)
     assert np.array_equal(run.kinematic.q, alone.q)
     near, far = physics.summarize_physics(run)
@@ -338,7 +338,7 @@ def test_reaching_in_physics(reaching, actuation, feedback):
 
 
 def test_the_measured_loop_is_the_servos_law(reaching):
-    # Perfect drives at the method's own rate: what is left is that they take time to follow.
+    # The drives are perfect and run at the method's rate: the only difference is the time that they take to follow.
     from sigmaik.sim import Measurement
     from sigmaik_lab.reach import experiment as ex
     from sigmaik_lab.reach.methods import parse_method

@@ -249,7 +249,7 @@ def test_search_finds_the_sets(name):
     found = sk.singularities.find(sk.robots.load(name), 2000)
     got = {(s.codimension, tuple(j + 1 for j in s.joints)) for s in found}
     assert EXPECTED[name] <= got
-    # What else there is must be rare, and of the kind that ranges cut off or that lies next to where sets meet.
+    # Other found sets must be rare: sets that the ranges cut off, or sets near points where two sets meet.
     others = sum(s.count for s in found if (s.codimension, tuple(j + 1 for j in s.joints)) not in EXPECTED[name])
     assert others <= 0.02 * sum(s.count for s in found)
 

@@ -142,7 +142,7 @@ def test_rows_beyond_the_third_are_angular():
         np.testing.assert_allclose(s.qdot, expected, rtol=0, atol=1e-12)
 
 
-# What is said of the answer ----------
+# Status of the answer ----------
 
 
 @pytest.mark.parametrize("method", METHODS, ids=repr)
@@ -171,7 +171,7 @@ def test_status_and_achieved_twist(method):
 
 
 def test_singular_directions_at_the_edge_of_the_workspace():
-    """A stretched planar arm cannot move along itself, and says which direction that is."""
+    """A stretched planar arm cannot move along itself, and the answer reports this direction."""
     J = np.array([[0.0, 0.0, 0.0], [3.0, 2.0, 1.0]])
     s = sk.VelocitySolver(sk.JParse()).solve(J, [1.0, 1.0])
     assert s.status == sk.Status.DAMPED
@@ -293,7 +293,7 @@ def test_the_rule_may_be_changed():
 
 
 def test_answers_are_their_own():
-    """What one call returned does not change with the next."""
+    """The answer of one call does not change with the next call."""
     rng = np.random.default_rng(10)
     solver = sk.VelocitySolver(sk.JParse())
     s = solver.solve(rng.normal(size=(6, 7)), rng.normal(size=6))
@@ -303,5 +303,5 @@ def test_answers_are_their_own():
     np.testing.assert_array_equal(qdot, copy[0])
     np.testing.assert_array_equal(s.qdot, copy[0])
     np.testing.assert_array_equal(s.singular_values, copy[1])
-    qdot[:] = 0  # and is the caller's
+    qdot[:] = 0  # the caller's own array
     np.testing.assert_array_equal(s.qdot, copy[0])

@@ -15,7 +15,7 @@ from sigmaik_lab.drill.experiment import ROBOTS, drill
 
 
 def until(condition, seconds=20.0):
-    """Waits for it; machines may be busy."""
+    """Waits for the condition; machines may be busy."""
     deadline = time.monotonic() + seconds
     while not condition():
         assert time.monotonic() < deadline, "it did not happen in time"
@@ -50,7 +50,7 @@ def test_a_pose_is_followed_and_a_stale_one_stops(session):
     until(lambda: latest(session)["command"] == sk.LoopCommand.STALE)
     until(lambda: not latest(session)["qdot"].any())
     assert latest(session)["status"] == sk.Status.HOLDING
-    session.refresh()  # the one who watches says it again
+    session.refresh()  # the watcher repeats the pose
     assert session.goal is not None
     until(lambda: latest(session)["command"] == sk.LoopCommand.POSE)
     session.pose_timeout = 30.0
@@ -67,7 +67,7 @@ def test_a_twist_moves_only_while_it_is_said(session):
     said = episode["command"] == sk.LoopCommand.TWIST
     assert said.any()
     assert np.diff(episode["time"][said]).sum() < session.twist_timeout + 0.1
-    session.refresh()  # there is no pose to say again
+    session.refresh()  # there is no pose to repeat
     time.sleep(0.05)
     assert latest(session)["command"] == sk.LoopCommand.STALE
 

@@ -19,7 +19,7 @@ def pairs(arm, count, seed=0):
 
 
 def violation(arm, plan, start, goal):
-    """The most by which anything that was asked for is broken."""
+    """The largest violation of a constraint."""
     h = plan.duration / len(plan.t)
     limits = arm.limits
     return max(
@@ -101,7 +101,7 @@ def test_no_worse_than_ipopt(name, avoid):
         if other.status != "optimal":
             continue
         assert violation(arm, other, start, goal) < 1e-6
-        if avoid is None:  # one minimum
+        if avoid is None:  # the problem has one minimum
             assert plan.cost == pytest.approx(other.cost, rel=1e-6)
         ours.append(plan.cost)
         theirs.append(other.cost)

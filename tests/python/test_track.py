@@ -1,4 +1,4 @@
-"""A moving target, its camera, and what follows it; streams from Python."""
+"""A moving target, its camera, and the arm that follows; streams from Python."""
 
 import csv
 
@@ -140,10 +140,10 @@ def test_modes_rank_as_they_must(experiment):
     for row in rows.values():
         assert row.broken == 0
         assert max(row.speed, row.acceleration, row.jerk) <= 1.0 + summary.TOLERANCE
-    # Known exactly, the twist fed forward leaves no lag; else it is 1/gain.
+    # An exactly known twist, fed forward, leaves no lag; without feed-forward the lag is 1/gain.
     assert abs(rows["true", True].delay) < 0.02
     assert rows["true", False].delay == pytest.approx(0.2, abs=0.05)
-    # A prediction makes up for the camera's delay, interpolation adds its own, and samples alone have both.
+    # Prediction compensates the camera's delay, interpolation adds a delay of its own, and raw samples lag most.
     assert (
         rows["true", True].delay
         < rows["predict", True].delay

@@ -85,7 +85,7 @@ def movable(path):
 
 
 def is_arm(path):
-    """Whether sigmaik should take it."""
+    """Whether sigmaik should accept the path."""
     for joint in movable(path):
         limit = joint.find("limit")
         if joint.get("type") in ("floating", "planar") or joint.find("mimic") is not None:
@@ -103,7 +103,7 @@ def vector(element, attribute, default):
 
 
 def turn(axis, angle):
-    """Rodrigues."""
+    """The rotation about an axis, by Rodrigues' formula."""
     x, y, z = axis
     K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     return np.eye(3) + np.sin(angle) * K + (1.0 - np.cos(angle)) * K @ K
@@ -183,7 +183,7 @@ def test_every_path(name):
 
 
 def test_most_paths_are_arms():
-    """The test above could refuse its way through: count what it compares."""
+    """The test above would pass if it refused every URDF: this test counts the comparisons."""
     paths = [path_to(file[1], leaf) for file in map(read, FILES.values()) if file for leaf in leaves(*file)]
     assert sum(map(is_arm, paths)) > 500
 

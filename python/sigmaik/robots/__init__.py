@@ -5,8 +5,8 @@
     >>> q = sk.robots.home("ufactory_xarm7")
     >>> arm = sk.robots.open("arm.urdf")          # a name, or a file of your own: arm.chain, arm.home
 
-Each file says in its first lines where its figures come from and what to know before using it.
-The tip of every arm is its mechanical flange (link ``flange``), the base the root link.
+The first lines of each file say where its figures come from, and what a user must know before using the file.
+The tip of every arm is its mechanical flange (link ``flange``), and the base is the root link.
 """
 
 from __future__ import annotations
@@ -32,12 +32,12 @@ class Arm(NamedTuple):
     """An arm, shipped or of a file, with a configuration to start from."""
 
     name: str
-    """Of the shipped arm, or of the file without its suffix."""
+    """Name of the shipped arm, or of the file without its suffix."""
     chain: Chain
     home: Array
     """(n,) [rad or m] inside the limits and away from singularities."""
     path: Path
-    """Of the URDF file."""
+    """Path of the URDF file."""
 
 
 def names() -> tuple[str, ...]:
@@ -74,11 +74,11 @@ def home(name: str) -> Array:
 def open(arm: str | os.PathLike[str], base: str | None = None, tip: str | None = None) -> Arm:
     """A shipped arm by its name, or the arm of a URDF file by its path.
 
-    base, tip: link names; by default the root and the only leaf, of a shipped arm the root and ``flange``
+    base, tip: link names; by default the root and the only leaf, for a shipped arm the root and ``flange``
 
     The home of a file, and of a shipped arm between other links, is the middle of the joint ranges; where the arm is
-    singular there, home is the best conditioned of 32 random configurations (of fixed seeds). ValueError where no arm
-    and no file has that name, or where the file describes no chain.
+    singular there, home is the best conditioned of 32 random configurations (with fixed seeds). ValueError where no arm
+    and no file has this name, or where the file describes no chain.
     """
     if arm in names():
         name, file = str(arm), path(str(arm))

@@ -30,8 +30,8 @@ class Execution:
     qdot: Array = field(repr=False)  #: (N, n) [rad/s or m/s]
     torque: Array = field(
         repr=False
-    )  #: (N, n) the largest |τ| in the period after the sample (the last: before) [N·m or N]
-    saturation: Array = field(repr=False)  #: (N, n) the part of it at the effort limit
+    )  #: (N, n) the largest |τ| in the period after the sample (last sample: before) [N·m or N]
+    saturation: Array = field(repr=False)  #: (N, n) the part of this period at the effort limit
     effort: Array = field(repr=False)  #: (n,) the effort limits, infinite where there is none
 
     @property
@@ -74,13 +74,14 @@ def execute(
     settle: float = 0.5,
     progress: Callable[[float], None] | None = None,
 ) -> Execution:
-    """Executes a planned motion, from its first position, by what the simulation measures.
+    """Executes a planned motion, from its first position, with feedback of the simulation's measurements.
 
-    A simulation of torques is driven by computed torque; one of velocities by q̇ = Δq_d/T + k (q_d − q), T the control
-    period, Δq_d the planned way in it. Errors are taken at the time of the measurement.
+    Computed torque drives a simulation of torques; the law q̇ = Δq_d/T + k (q_d − q) drives a simulation of velocities,
+    with T the control period and Δq_d the planned motion in this period. Errors are taken at the time of the
+    measurement.
 
-    control: None: the default one, of the arm alone. Of torques only
-    position_gain: k [1/s] of velocities
+    control: for torques only; None: the default `ComputedTorque` of the arm alone
+    position_gain: k [1/s], for velocities only
     settle: [s] for which the last position is held
     progress: called with the simulated time [s], once a period
 

@@ -135,8 +135,8 @@ def _quaternion(rotation: Array) -> Array:
 
 
 def _together(parts: Sequence[tuple[_core.Inertia, Array]]) -> tuple[float, Array, Array]:
-    """Mass, centre and tensor about it, of inertias in frames (4, 4), in the frame of these. Steiner: m (r·r I − r
-    rᵀ)."""
+    """Mass, centre, and tensor about the centre, of several inertias, each with its frame (4, 4) in a common frame.
+    Steiner's theorem adds m (r·r I − r rᵀ)."""
     mass = sum(inertia.mass for inertia, _ in parts)
     centres = [frame[:3, :3] @ inertia.center_of_mass + frame[:3, 3] for inertia, frame in parts]
     centre = np.zeros(3)

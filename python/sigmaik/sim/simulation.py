@@ -23,9 +23,9 @@ _GRAVITY = (0.0, 0.0, -9.80665)
 
 @dataclass(frozen=True)
 class Measurement:
-    """What the arm's sensors say."""
+    """A measurement of the arm's sensors."""
 
-    t: float  #: [s] when it was measured: `delay` control periods ago, but not before the start
+    t: float  #: [s] time of the measurement: `delay` control periods ago, but not before the start
     q: Array  #: (n,) [rad or m]
     qdot: Array  #: (n,) [rad/s or m/s]
 
@@ -58,26 +58,25 @@ class Simulation:
     ) -> None:
         """
         chain: an arm all of whose moving links have inertias (see Dynamics)
-        actuation: what `step` takes. "velocity": each joint has a velocity loop of its own, closed in every physics
-        step,
-            τ = K_v (e + ω_i ∫ e dt) + g(q), e = q̇_command − q̇, cut at the effort limit; "torque": τ itself, held over
-            the control period, cut
-        timestep: [s] of physics; it divides control_period
+        actuation: the command of `step`. "velocity": each joint has a velocity loop of its own, closed in every physics
+            step, τ = K_v (e + ω_i ∫ e dt) + g(q), e = q̇_command − q̇, cut at the effort limit; "torque": τ itself, held
+            over the control period, cut at the effort limit
+        timestep: [s] of physics, which has to divide control_period
         control_period: [s] from one command to the next
-        bandwidth: ω_v [1/s] of the velocity loops: K_v = ω_v · max M_ii, the most over 256 configurations. As M ≤ n
-        diag(M),
-            no motion's error decays more slowly than with ω_v/n. K_v q̇ is integrated implicitly: any ω_v is stable
-        integral_rate: ω_i [1/s]; 0: no integral. It stands still while its joint's torque is cut
-        gravity_compensation: g(q), of the arm alone: the drives do not know the payload. Of "velocity" only
-        velocity_limits: velocity commands are cut at the chain's limits, as drives do. Of "velocity" only
+        bandwidth: ω_v [1/s] of the velocity loops: K_v = ω_v · max M_ii, the maximum over 256 configurations. As
+            M ≤ n diag(M), no motion's error decays more slowly than with ω_v/n. K_v q̇ is integrated implicitly, so that
+            any ω_v is stable
+        integral_rate: ω_i [1/s]; 0: no integral. The integral stands still while its joint's torque is cut
+        gravity_compensation: g(q), of the arm alone: the drives do not know the payload. For "velocity" only
+        velocity_limits: velocity commands are cut at the chain's limits, as drives do. For "velocity" only
         effort_limits: torques are cut at the chain's limits; False: drives of any strength
         position_stops: the chain's position limits are stops, as stiff as MuJoCo's default; False: joints pass them
-        viscous_friction: [N·m·s/rad], (n,) or one number; torque −b q̇
-        coulomb_friction: [N·m], (n,) or one number; dry friction of at most this
+        viscous_friction: b [N·m·s/rad], (n,) or one number; torque −b q̇
+        coulomb_friction: [N·m], (n,) or one number; dry friction of at most this torque
         armature: [kg·m²], (n,) or one number: rotors' inertia, seen at the joint
         payload: what the tip carries
         gravity: (3,) [m/s²], in base axes
-        position_noise, velocity_noise: standard deviations [rad or m, rad/s or m/s] of what is measured
+        position_noise, velocity_noise: standard deviations [rad or m, rad/s or m/s] of measurements
         delay: control periods by which measurements are late
         seed: of the noise
 
@@ -152,8 +151,8 @@ class Simulation:
     def step(self, command: ArrayLike) -> Measurement:
         """Drives the joints by a command (n,) [rad/s, or N·m] for one control period; then measures.
 
-        Error where the command has a wrong size or is not finite, and where the motion is no longer finite. Of the
-        latter MuJoCo itself warns on stderr and in a file MUJOCO_LOG.TXT.
+        Error where the command has a wrong size or is not finite, and where the motion is no longer finite. In the
+        latter case MuJoCo itself warns, too, on stderr and in a file MUJOCO_LOG.TXT.
         """
         asked = self._sized(command, "the command")
         data = self.data
@@ -188,12 +187,12 @@ class Simulation:
 
     @property
     def q(self) -> Array:
-        """(n,) where the arm truly is [rad or m]."""
+        """(n,) true positions [rad or m]."""
         return np.array(self.data.qpos)
 
     @property
     def qdot(self) -> Array:
-        """(n,) how it truly moves [rad/s or m/s]."""
+        """(n,) true velocities [rad/s or m/s]."""
         return np.array(self.data.qvel)
 
     @property

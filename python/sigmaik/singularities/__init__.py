@@ -9,7 +9,7 @@
     sk.singularities.find(chain)  # any arm, numerically
 
 The known sets are those of Beck et al. (2022) for the Comau Racer 7-1.4, the KUKA LBR iiwa 14 R820 and the Franka Emika
-Panda, corrected where they do not hold as printed, and with one of the Panda that is missing there.
+Panda, corrected where a printed condition does not hold, and with one set of the Panda that the paper does not have.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def names() -> tuple[str, ...]:
 
 
 def load(name: str) -> SingularSets:
-    """The known singular sets of a shipped arm. ValueError with the names that there are for any other."""
+    """The known singular sets of a shipped arm. For any other name ValueError, whose text lists the known names."""
     return _core.load_singular_sets(name)
 
 
@@ -47,6 +47,7 @@ def of(chain: Chain) -> SingularSets | None:
     """The known singular sets of a chain that has the kinematics of one of these arms, whatever its base, tool and
     names.
 
-    None for any other: its axes are compared, so another zero of a joint inside the arm is another arm.
+    None for any other chain. The function compares the axes, so a chain whose inner joints have other zeros counts as
+    another arm.
     """
     return _core.singular_sets_of(chain)

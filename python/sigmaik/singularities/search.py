@@ -1,10 +1,10 @@
 """Singular sets of any arm, found numerically.
 
-An arm is singular at q where some unit vector u of twists cannot be made: J(q)ᵀu = 0. In (q, u) this is a smooth system
-with many more unknowns than equations; from a random start, Newton's method in its least-norm form, damped far from a
-solution, converges to a nearby one, quadratically. At what it finds, with N a basis of the null space of J, the set's
-tangent space is where Nᵀ ∂(Jᵀu)/∂q δq = 0: the rank of that matrix is the set's codimension, and the joints whose
-columns are not zero are those that its condition is about.
+An arm is singular at q where the tip cannot move along some unit twist u: J(q)ᵀu = 0. In (q, u) these equations are a
+smooth system with many more unknowns than equations. From a random start, Newton's method in its least-norm form,
+damped far from a solution, converges quadratically to a nearby solution. At a solution, with N a basis of the null
+space of J, the tangent space of the set is given by Nᵀ ∂(Jᵀu)/∂q δq = 0: the rank of the matrix Nᵀ ∂(Jᵀu)/∂q is the
+codimension of the set, and the joints whose columns are not zero are the joints in the set's condition.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ __all__ = ["FoundSet", "find", "singular_configurations"]
 SINGULAR = 1e-10
 """σ_min/σ_max below which a configuration is singular."""
 ZERO = 1e-5
-"""What is smaller counts as zero in the classification, relative to the largest."""
+"""Values below this part of the largest value count as zero in the classification."""
 
 
 @dataclass(frozen=True)
@@ -30,13 +30,13 @@ class FoundSet:
     """A set of singular configurations that involves the same joints in the same way."""
 
     codimension: int
-    """How many conditions hold on it: 1 is a wall, round others there is a way."""
+    """Number of conditions that hold on the set. A set of codimension 1 is a wall; paths can go round other sets."""
     joints: tuple[int, ...]
-    """Indices of the joints in these conditions; along all others it goes on."""
+    """Indices of the joints in these conditions; the conditions do not depend on the other joints."""
     values: dict[int, tuple[float, ...]]
-    """Joint positions [rad or m] that are the same all over the set, up to five each; for other joints nothing."""
+    """Joint positions [rad or m] that are the same all over the set, up to five each; other joints are left out."""
     count: int
-    """How many of the configurations found lie on it."""
+    """Number of the found configurations that lie on the set."""
     configurations: Array = field(repr=False)
     """(count, n)"""
 
@@ -44,10 +44,11 @@ class FoundSet:
 def find(chain: Chain, starts: int = 2000, seed: int = 0) -> list[FoundSet]:
     """Singular sets of a chain within its joint ranges, the most often found first.
 
-    `starts` random configurations are drawn there (within ±π where a joint has no limits). Sets of a high codimension,
-    or in a corner of the ranges, are found seldom, and may be missed: many starts are evidence of completeness, no
-    proof. Two sets with the same codimension and joints count as one. Where two sets meet, more than one twist is lost,
-    and what is found there is left out. A chain of fewer than six joints is singular everywhere: ValueError.
+    The search starts from `starts` random configurations in these ranges (within ±π where a joint has no limits). Sets
+    of a high codimension, or in a corner of the ranges, are found seldom and may be missed; many starts are evidence of
+    completeness, and no proof. Two sets with the same codimension and joints count as one set. Where two sets meet,
+    more than one twist is lost; the search leaves such configurations out. ValueError for a chain of fewer than six
+    joints, which is singular everywhere.
     """
     q = singular_configurations(chain, starts, seed)
     groups: dict[tuple[int, tuple[int, ...]], list[Array]] = {}
@@ -120,7 +121,7 @@ def _classify(chain: Chain, q: Array) -> list[tuple[int, tuple[int, ...]] | None
         _, size, rows = np.linalg.svd(normal)
         rank = int(np.sum(size > 1e-3 * size[0])) if size[0] > ZERO else 0
         if rank == 0 or (rank < len(size) and size[rank] > ZERO * size[0]):
-            keys.append(None)  # next to where two sets meet
+            keys.append(None)  # near a point where two sets meet
             continue
         joints = np.flatnonzero(np.abs(rows[:rank]).max(axis=0) > ZERO)
         keys.append((rank, tuple(int(j) for j in joints)))

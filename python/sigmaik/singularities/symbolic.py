@@ -1,6 +1,7 @@
-"""The conditions as expressions: from the description that the compiled code is made of, for any algebra.
+"""The conditions as expressions in any algebra, from the description from which the compiled code is made.
 
-`q` is a sequence of n numbers or symbols that add, subtract and multiply; `sin`, `cos` and `exp` take one. With casadi:
+`q` is a sequence of n numbers or symbols that add, subtract and multiply; `sin`, `cos` and `exp` take one symbol. With
+`casadi`:
 
     q = casadi.SX.sym("q", 7)
     residuals = symbolic_residuals(sing, casadi.vertsplit(q), sin=casadi.sin, cos=casadi.cos)
@@ -22,7 +23,7 @@ Function = Callable[[Any], Any]
 def symbolic_residuals(
     sets: SingularSets, q: Sequence[Any], sin: Function = math.sin, cos: Function = math.cos
 ) -> list[list[Any]]:
-    """Residuals r of every set, a list of `codimension` expressions each: the set is where all of them vanish."""
+    """Residuals r of every set, a list of `codimension` expressions each. On the set all its residuals are zero."""
     flat = _replay(sets._residual_tape(), q, sin, cos)
     out, at = [], 0
     for codimension in sets.codimensions:

@@ -4,11 +4,11 @@
     with session:                                  # starts the servo, and stops it
         session.start_recording()
         session.follow(target)                     # (4, 4); or session.twist([vx, vy, vz, wx, wy, wz])
-        session.configure(method="dls")            # under way, without a kick
+        session.configure(method="dls")            # during the motion, without a jump
         episode = session.stop_recording()
     episode.save("episode.npz")
 
-`sigmaik teleop` puts a page in the browser before it (`sigmaik.teleop.page`, extra `viewer`).
+`sigmaik teleop` shows a session on a page in the browser (`sigmaik.teleop.page`, extra `viewer`).
 """
 
 from .episode import Episode

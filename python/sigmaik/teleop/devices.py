@@ -1,7 +1,7 @@
 """Gamepads and SpaceMice as twists (extra `devices`). A missing device is an error.
 
-Both move only while a button is held (the dead man's switch): the left shoulder button of a gamepad, the left button
-of a SpaceMouse. They are plugged into the machine that runs the servo.
+Both devices move the arm only while a button is held (the dead man's switch): the left shoulder button of a gamepad,
+the left button of a SpaceMouse. The devices are plugged into the machine that runs the servo.
 """
 
 from __future__ import annotations

@@ -1,17 +1,18 @@
-"""A recording: every cycle of a servo, with what it takes to play it again.
+"""A recording: every cycle of a servo, with everything that a replay needs.
 
-As an npz file (numpy.load reads it, without pickles) it has an array of N rows for each field of `ServoLoop.read`:
+A recording as an npz file (numpy.load reads the file, without pickles) has an array of N rows for each field of
+`ServoLoop.read`:
 
     cycle, time [s], command (0 hold, 1 pose, 2 twist, 3 stale), configuration, restarted, status (sigmaik.Status),
     q (N, n), qdot (N, n), target (N, 4, 4), pose (N, 4, 4), pose_error (N, 6), asked_twist (N, 6),
     achieved_twist (N, 6), singular_values (N, min(6, n)), singular (bits), singular_directions (N, 6, 6),
     limiting_joints (bits), scale
 
-and joint_names, lower, upper, velocity, acceleration (n,) (the limits, as they were held), home (n,), before (2, n)
+and joint_names, lower, upper, velocity, acceleration (n,) (the limits that the servo held), home (n,), before (2, n)
 (q and q̇ before the first cycle), urdf (the arm's text), and meta: JSON with robot, base, tip, dt, settings (a
 configuration's number to its settings) and version.
 
-As a parquet file (extra `viewer`) it has a row a cycle and the columns that tools for imitation learning read:
+A recording as a parquet file (extra `viewer`) has a row for each cycle, and columns for tools of imitation learning:
 
     timestamp [s] from 0, frame_index, episode_index, observation.state (n,) q, observation.velocity (n,) q̇,
     action (6,) the twist that was asked for [v; ω], pose (16,) the tip's, row by row, command, status (text)
@@ -57,7 +58,7 @@ class Arm:
 
 @dataclass(frozen=True)
 class Episode:
-    """What a `Session` recorded."""
+    """A recording of a `Session`."""
 
     samples: Samples  #: (N,) as `ServoLoop.read` gives them
     arm: Arm
@@ -86,9 +87,9 @@ class Episode:
         return [slice(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True)]
 
     def broken_limits(self) -> dict[str, int]:
-        """How many joints times cycles were beyond a limit by more than rounding, while limits were on.
+        """The number of joints times cycles beyond a limit by more than rounding, while limits were on.
 
-        Position, velocity, acceleration. The first cycles after a start outside of them count, too.
+        The keys are position, velocity and acceleration. The first cycles after a start outside the limits count, too.
         """
         limits = self.arm.chain.limits
         on = np.array([self.settings[number].limits for number in self["configuration"].tolist()], dtype=bool)
@@ -104,9 +105,10 @@ class Episode:
         return count
 
     def play(self) -> Array:
-        """(N, n) the positions that a fresh servo commands when it is given the same commands, cycle by cycle.
+        """(N, n) the positions that a fresh servo commands for the same commands, cycle by cycle.
 
-        The recording's own, to the bit, on the machine that recorded it. ValueError where cycles are missing.
+        On the machine that made the recording these positions equal the recorded positions, to the bit. ValueError
+        where cycles are missing.
         """
         out = np.empty_like(self["q"])
         servo: sk.Servo | None = None

@@ -1,4 +1,4 @@
-"""What the page shows beside the arm, as HTML: status in words, singular values, joints against their limits."""
+"""The page's gauges beside the arm, as HTML: status in words, singular values, joints against their limits."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def status_text(
 def singular_bars(sigma: Array, gamma: float | None, singular: int | None = None) -> str:
     """A bar for each singular value, as parts of the largest, with the threshold γ where the method has one.
 
-    Bit i of `singular`: direction i is singular to the rule; None: no rule has run, and γ says.
+    Bit i of `singular`: direction i is singular to the rule; None: no rule has run, and γ decides.
     """
     largest = float(sigma[0]) if len(sigma) and sigma[0] > 0.0 else 1.0
     rows = []
@@ -79,7 +79,7 @@ def singular_bars(sigma: Array, gamma: float | None, singular: int | None = None
 
 
 def joint_bars(q: Array, qdot: Array, chain: sk.Chain, limiting: int) -> str:
-    """Position within its range, and speed of its limit, joint by joint."""
+    """Each joint's position within its range, and its speed as a part of its limit."""
     limits = chain.limits
     rows = []
     for i, name in enumerate(chain.joint_names):

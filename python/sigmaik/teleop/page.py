@@ -56,10 +56,10 @@ class Page:
         parquet: bool = True,
     ) -> None:
         """
-        host: who may connect; 127.0.0.1 is this machine only
-        port: 0 takes a free one
+        host: the address to listen on; only this machine can reach 127.0.0.1
+        port: 0 takes a free port
         directory: of recordings
-        parquet: write them as parquet, too
+        parquet: write recordings as parquet, too
         """
         need("viser", "yourdfpy")
         if parquet:
@@ -101,7 +101,7 @@ class Page:
         self._closed.wait(seconds)
 
     def open_device(self, name: str) -> str:
-        """Drives by a gamepad or a SpaceMouse ("none" ends it). Returns its name; ValueError where it is not there."""
+        """Drives by a gamepad or a SpaceMouse ("none" ends this). Returns its name; ValueError without the device."""
         device = None if name == "none" else open_device(name)
         old, self._device = self._device, device
         if old is not None:

@@ -1,4 +1,4 @@
-"""What is drawn in the page's scene: the arm, its target, and what its Jacobian says at the tool."""
+"""The page's scene: the arm, its target, and at the tool the velocity ellipsoid, singular directions and velocities."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def singular_lines(directions: Array, length_scale: float) -> tuple[Array, Array
 
 
 def task_singular_values(jacobian: Array, rotation: Array, settings: Settings) -> Array:
-    """Singular values of the weighted task Jacobian, where no cycle says them; `rotation` (3, 3): tip in base."""
+    """Singular values of the weighted task Jacobian, for samples that have none; `rotation` (3, 3): tip in base."""
     rows = jacobian.copy()
     if settings.frame == "tool":
         rows[:3], rows[3:] = rotation.T @ rows[:3], rotation.T @ rows[3:]
@@ -52,7 +52,7 @@ def task_singular_values(jacobian: Array, rotation: Array, settings: Settings) -
 
 
 class Scene:
-    """The handles of what is drawn."""
+    """The handles of the drawn objects."""
 
     def __init__(self, server: viser.ViserServer, session: Session) -> None:
         scene = server.scene
@@ -82,7 +82,7 @@ class Scene:
         )
         self._trace: collections.deque[tuple[Array, tuple[int, int, int]]] = collections.deque(maxlen=_TRACE_LENGTH)
         self._chain, self._ticks = session.chain, 0
-        # Of the last cycle that resolved a twist, and where the arm was.
+        # Directions and joint positions of the last cycle that resolved a twist.
         self._directions, self._resolved_at = np.full((6, 6), np.nan), np.full(session.chain.dof, np.inf)
 
     def place_target(self, pose: Array) -> None:
@@ -111,7 +111,7 @@ class Scene:
 
         if np.isfinite(sample["singular_values"]).any():
             self._directions, self._resolved_at = sample["singular_directions"].copy(), q.copy()
-        elif np.abs(q - self._resolved_at).max() > 0.05:  # put elsewhere since
+        elif np.abs(q - self._resolved_at).max() > 0.05:  # the arm was put elsewhere since then
             self._directions = np.full((6, 6), np.nan)
         lines = singular_lines(self._directions, length_scale)
         for handle, shown in zip((self.linear, self.angular), lines, strict=True):
@@ -143,5 +143,5 @@ def _place(handle: Any, pose: Array) -> None:
 
 
 def _reach(chain: sk.Chain) -> float:
-    """[m] the farthest of some random tip positions from the base."""
+    """[m] Largest distance of some random tip positions from the base."""
     return max(float(np.linalg.norm(chain.pose(chain.random_configuration(seed))[:3, 3])) for seed in range(200))

@@ -19,14 +19,14 @@ from .target import TargetPose
 __all__ = ["Session"]
 Samples = NDArray[np.void]
 
-#: [rad/s² or m/s²] Limit of joints without an acceleration limit: commands of a hand are never smooth.
+#: [rad/s² or m/s²] Limit of joints without an acceleration limit: commands given by hand are never smooth.
 ACCELERATION = 10.0
 #: [cycles] The longest recording: ten minutes at 1 kHz, half a gigabyte.
 LONGEST_RECORDING = 600_000
 
 
 class Session:
-    """A simulated arm, its servo in a thread, and what is asked of it. Its functions may be called from any thread.
+    """A simulated arm, its servo in a thread, and the commands. Any thread may call the functions of a session.
 
     Commands go stale: the arm stops within its limits unless the command is repeated in time. `refresh` repeats a pose;
     the code that watches over the commander calls `refresh` while the commander is alive.
@@ -53,7 +53,7 @@ class Session:
         acceleration: [rad/s² or m/s²] limit of joints that have none
         pose_timeout, twist_timeout: [s] after which a command is stale
         longest_recording: [cycles], where a recording ends by itself
-        ValueError where one is wrong, with the facts.
+        ValueError where an argument is wrong, with the facts.
         """
         name, chain, home, self.source = sk.robots.open(robot, base, tip)
         if not 1.0 <= rate <= 20e3:
@@ -144,7 +144,7 @@ class Session:
         return self._settings
 
     def configure(self, **changes: Any) -> None:
-        """Changes settings by name, under way. ValueError, and all stays, where one is wrong."""
+        """Changes settings by name, during the motion. Where a name or value is wrong, ValueError and no change."""
         with self._lock:
             settings = self._settings.with_(**changes)
             servo = settings.servo(self.chain, self._dt, self.home)
@@ -154,7 +154,7 @@ class Session:
     # --- what happens
 
     def read(self) -> Samples:
-        """(N,) what was done since the last call, see `ServoLoop.read`. Recordings live on this: call it often."""
+        """(N,) the samples since the last call, see `ServoLoop.read`. Recordings are made here: call `read` often."""
         with self._lock:
             samples: Samples = self._loop.read()
             if self._recorded is not None:
@@ -182,12 +182,12 @@ class Session:
 
     @property
     def statistics(self) -> sk.LoopStatistics:
-        """How the servo keeps its rate."""
+        """Cycles, rate and delays of the servo."""
         return self._loop.statistics
 
     @property
     def rate(self) -> float:
-        """[Hz] that was asked for."""
+        """[Hz] The rate that was asked for."""
         return 1.0 / self._dt
 
     # --- recording
@@ -207,7 +207,7 @@ class Session:
         return self.recorded >= self.longest_recording
 
     def start_recording(self) -> None:
-        """From the next cycle on. ValueError where it is recording already."""
+        """Records from the next cycle on. ValueError where a recording already runs."""
         with self._lock:
             if self._recorded is not None:
                 raise ValueError("it is recording already")
@@ -219,7 +219,7 @@ class Session:
             self._recorded, self._recorded_cycles = [], 0
 
     def stop_recording(self) -> Episode:
-        """What was recorded. ValueError where nothing was."""
+        """Ends the recording and returns it. ValueError where no cycle was recorded."""
         with self._lock:
             if self._recorded is None:
                 raise ValueError("it is not recording")

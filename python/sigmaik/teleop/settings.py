@@ -1,4 +1,4 @@
-"""What can be changed while an arm is driven."""
+"""The settings that can be changed while an arm is driven."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ __all__ = ["Settings"]
 
 @dataclass(frozen=True)
 class Settings:
-    """Rule, gains, limits and task of a `Session`'s servo. ValueError where one is out of its range."""
+    """Rule, gains, limits and task of a `Session`'s servo. ValueError where a value is out of its range."""
 
     method: str = "jparse"  #: as for `sigmaik reach`: "jparse", "dls:damping=0.05"
     gamma: float = 0.1  #: γ of J-PARSE and its ablations, threshold on σ_i/σ_max
@@ -25,8 +25,8 @@ class Settings:
     singular_posture: bool = True  #: whether the posture acts along J-PARSE's singular directions
     gain_linear: float = 5.0  #: [1/s] position error to velocity
     gain_angular: float = 5.0  #: [1/s] orientation error to angular velocity
-    max_linear_error: float = 0.08  #: [m] longer position errors are shortened to it
-    max_angular_error: float = 0.4  #: [rad] longer orientation errors are shortened to it
+    max_linear_error: float = 0.08  #: [m] longer position errors are shortened to this length
+    max_angular_error: float = 0.4  #: [rad] longer orientation errors are shortened to this angle
     posture_gain: float = 0.5  #: [1/s] pull towards where the arm started
     limits: bool = True  #: hold all joint limits
     on_limit: Literal["redistribute", "scale"] = "redistribute"
@@ -56,7 +56,7 @@ class Settings:
         return replace(self, **changes)  # type: ignore[arg-type]
 
     def rule(self, rate: float = 1000.0) -> methods.NamedMethod:
-        """The method at a servo's rate [Hz]. The page asks at each frame, so the last answers are kept."""
+        """The method at a servo's rate [Hz]. The page asks at each frame, so a cache keeps the last methods."""
         return _rule(self.method, self.gamma, self.singular_gain, self.singular_posture, rate)
 
     def servo(self, chain: sk.Chain, dt: float, posture: ArrayLike) -> sk.Servo:

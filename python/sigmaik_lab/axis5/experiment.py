@@ -5,7 +5,7 @@ manipulators by constraint optimization", IROS 1999, on a KUKA KR 6 R900. The ti
 constant orientation, one sample every dt:
 
 1. there and back, close by the singularity. The wrist's centre stays in the plane of axis 1, and the hand is
-   tilted out of it by the offset, so that axis 5 comes no closer to zero than that.
+   tilted out of this plane by the offset, so that axis 5 comes no closer to zero than the offset.
 2. straight across: the arm starts with axis 5 at zero (or at the offset), and moves at right angles to the
    plane in which the wrist is.
 
@@ -44,8 +44,8 @@ VARIANTS = {
     "scaled-exact": "scaled, all exact",
 }
 
-# Forearm level and pointing ahead where axis 5 passes zero; raised by 20° where the tip goes across, so that
-# it is geometry, and not rounding, that decides which way axes 4 and 6 turn.
+# The forearm is level and points ahead where axis 5 passes zero. Where the tip goes across, the forearm is raised
+# by 20°, so that geometry, and not rounding, decides which way axes 4 and 6 turn.
 _CLOSE_BY = (0.0, -90.0, 90.0, 90.0, 0.0, -90.0)  # [°]
 _ACROSS = (0.0, -80.0, 100.0, 0.0, 0.0, 0.0)  # [°]
 
@@ -55,10 +55,10 @@ _STUCK = 0.25  # [s] at a complete stop, after which a run is given up
 
 @dataclass(frozen=True)
 class Axis5Settings:
-    """How the samples are taken, and the weights. None is a value that goes with dt, see the properties."""
+    """The sampling and the weights. None stands for a value that depends on dt, see the properties."""
 
     dt: float = 4e-3  #: [s] from one sample to the next
-    rest: float = 0.3  #: [s] the target stands still after the motion, for what error is left to decay
+    rest: float = 0.3  #: [s] the target stands still after the motion, so that the remaining error decays
     beta: float | None = None  #: weight of the error's change in a sample
     gamma: float | None = None  #: weight of the time scaling
     max_error: float | None = math.radians(3.0)  #: [rad] largest orientation error, each axis; None: any
@@ -87,7 +87,7 @@ class Motion:
     distance: float  #: [m] from one end to the other
     duration: float  #: [s] from one end to the other
     offset: float  #: [rad] of axis 5 from zero, where it is closest
-    back: bool  #: and back again, in as much time
+    back: bool  #: whether the tip moves back again, in the same time
 
     @property
     def total(self) -> float:
@@ -105,18 +105,18 @@ class Motion:
 
 @dataclass(frozen=True)
 class Track:
-    """What a variant did. Sample 0 is the start, at rest; sample k is k dt later."""
+    """Time series of a variant. Sample 0 is the start, at rest; sample k is k dt later."""
 
     motion: Motion
     settings: Axis5Settings
     variant: str  #: a key of VARIANTS
     finished: bool  #: whether the end was reached; time scaling may come to a complete stop
-    clock: Array  #: (N,) [s] how far the target is on its way; t, where time is not scaled
+    clock: Array  #: (N,) [s] the target's own time, which is t where time is not scaled
     q: Array  #: (N, 6) [rad]
     error: Array  #: (N, 6) [m, rad] tip minus target, base axes
-    path_error: Array  #: (N, 6) the same, of the target slowed down by ϑ
+    path_error: Array  #: (N, 6) the same, against the target slowed down by ϑ
     time_scale: Array  #: (N,) ϑ
-    optimised: NDArray[np.bool_]  #: (N,) not the closed form
+    optimised: NDArray[np.bool_]  #: (N,) from the optimisation, not from the closed form
     error_active: NDArray[np.bool_]  #: (N,) max_error is active, or cannot be met
     exact_met: NDArray[np.bool_]  #: (N,) the exact part's equations hold
 
@@ -140,7 +140,7 @@ class Track:
 
     @property
     def position_error(self) -> Array:
-        """(N,) [m] of the path: of the target slowed down by ϑ."""
+        """(N,) [m] of the path: against the target slowed down by ϑ."""
         norm: Array = np.linalg.norm(self.path_error[:, :3], axis=1)
         return norm
 
@@ -179,7 +179,7 @@ def motion(
     pose = chain.pose(q)
     if not first:
         return Motion(example, chain, q, pose, np.array([0.0, 1.0, 0.0]), distance, duration, offset, False)
-    # Down, from half the distance above: walked there by the closed form, on the same branch.
+    # The line leads down from half the distance above; the closed form moves the arm there, on the same branch.
     closed = sk.AnalyticIk(chain)
     pose[2, 3] += 0.5 * distance
     for left in np.linspace(0.5, 0.0, 501):

@@ -34,8 +34,8 @@ _COLOURS = {
 def axis_figure(tracks: Sequence[Track], joint: int) -> Figure:
     """Position, difference, speed and acceleration of a joint: a column per variant, against the closed form.
 
-    The difference is to the closed form at the same point of the path. Limits are dashed; what is far beyond
-    them is cut off, with a note. Variants that did not finish are left out.
+    The difference is to the closed form at the same point of the path. Limits are dashed; curves far beyond a
+    limit are cut off, with a note. Variants that did not finish are left out.
     """
     closed, others = _split(tracks)
     chain = closed.motion.chain
@@ -183,7 +183,7 @@ def _style(track: Track) -> dict[str, Any]:
 
 
 def _limit(axes: Axes, limit: float, curves: Sequence[Array]) -> None:
-    """Draws ±limit where a curve comes near it, and cuts off what is far beyond."""
+    """Draws ±limit where a curve comes near the limit, and cuts off curves far beyond."""
     peak = max(float(np.abs(curve).max()) for curve in curves)
     if peak < 0.4 * limit:
         _note(axes, f"limit ±{limit:.3g}", "0.35")

@@ -16,14 +16,14 @@ __all__ = ["Summary", "summarize"]
 
 @dataclass(frozen=True)
 class Summary:
-    """One variant. Tuples are one number a joint."""
+    """One variant. A tuple has one number for each joint."""
 
     variant: str
     finished: bool
     duration: float  #: [s] until the target's end is reached, without the rest
     speed_ratio: tuple[float, ...]  #: largest |q̇|/limit
     acceleration_ratio: tuple[float, ...]  #: largest |q̈|/limit
-    speed_beyond: int  #: samples with |q̇| beyond a limit, by more than 1e-9 of it, summed over the joints
+    speed_beyond: int  #: samples with |q̇| beyond a limit by more than 1e-9 of the limit, summed over the joints
     acceleration_beyond: int  #: the same of |q̈|
     at_limit: float  #: [s] with a joint within 1e-6 of its speed or acceleration limit, or beyond
     max_position_error: float  #: [m] of the path

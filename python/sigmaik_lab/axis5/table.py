@@ -14,7 +14,7 @@ __all__ = ["headline", "smoothness_table", "summary_table"]
 
 
 def headline(motion: Motion, settings: Axis5Settings) -> str:
-    """What is run, in two lines."""
+    """The motion and the settings, in a few lines."""
     way = "there and back, close by" if motion.back else "straight across"
     cap = settings.max_error
     most = "any" if cap is None or math.isinf(cap) else f"at most {math.degrees(cap):g}° about each axis"
@@ -27,7 +27,7 @@ def headline(motion: Motion, settings: Axis5Settings) -> str:
 
 
 def summary_table(rows: Sequence[Summary]) -> Table:
-    """Limits and errors: a line per variant, for 80 characters. What is beyond a limit is red."""
+    """Limits and errors: a line per variant, for 80 characters. Figures beyond a limit are red."""
     heads = ("\ntime\ns", "top\nspeed\n/limit", "top\naccel.\n/limit", "be-\nyond\nlimits")
     table = _table((*heads, "pos.\nerror\nµm", "ori.\nerror\n°", "top\nϑ\n"))
     for row in rows:

@@ -1,6 +1,6 @@
 """A UR10 on a cart by its shoulder singularity (Salvato et al. 2022, section 4): the ways to drive the cart.
 
-Two variants, as no mounting of a UR10 makes the paper's joints give the paper's poses:
+There are two variants, because no mounting of a UR10 makes the paper's joints give the paper's poses:
 
     fk     the poses are those of the paper's joints, at the flange
     paper  the poses are the paper's; a constant tool takes the arm from its joints to them
@@ -41,7 +41,7 @@ METHODS = {
 _JOINTS = (-1.235, -1.7272, 0.7, -1.0, 1.5951, -0.0311)
 _LAST_AXIS_1 = 1.235
 _CART = (0.5, 0.75)
-# x, y, z [m], then the turns about z, y, x [rad], of each in the axes that the one before has turned. The paper's
+# x, y, z [m], then the turns about z, y, x [rad], each in the axes that the turn before has rotated. The paper's
 # second pose lacks a comma: "1.4551 − 0.1648" is z and the turn about z.
 _POSES = (
     (0.2607, 0.1354, 1.4551, -2.6348, 0.7090, -0.1134),
@@ -53,7 +53,7 @@ _MIDDLES = np.array([0.5, *6 * [0.0]])
 
 @dataclass(frozen=True)
 class CartExperiment:
-    """What is taught, and the straight line between."""
+    """The taught configurations, and the straight line between them."""
 
     variant: str
     chain: sk.Chain = field(repr=False)
@@ -72,27 +72,27 @@ class CartExperiment:
 
     @property
     def path(self) -> PosePath:
-        """Of the tool, over [0, 1]."""
+        """Path of the tool, over [0, 1]."""
         return pose_paths(self.poses, None, False)[0]
 
     @property
     def s(self) -> Array:
-        """(M,) of the samples, in [0, 1]."""
+        """(M,) path parameter of the samples, in [0, 1]."""
         return np.linspace(0.0, 1.0, self.samples)
 
     @property
     def turn(self) -> float:
-        """[rad] of joint 1."""
+        """[rad] Angle by which joint 1 was taught to turn."""
         return float(self.taught[1, 1] - self.taught[0, 1])
 
     @functools.cached_property
     def flange_xy(self) -> Array:
-        """(M, 2) [m] of the point whose path is planned with: the poses' origin, as in the paper."""
+        """(M, 2) [m] Path of the point that keeps out of the cylinder: the poses' origin, as in the paper."""
         return self.path(self.s)[:, :2, 3].copy()
 
 
 def load(variant: str, samples: int = 5068) -> CartExperiment:
-    """One of `VARIANTS`; ValueError for another name."""
+    """Loads one of `VARIANTS`; ValueError for another name."""
     if variant not in VARIANTS:
         raise ValueError(f"no variant {variant!r}; there are {', '.join(VARIANTS)}")
     if samples < 10:
@@ -111,14 +111,14 @@ def load(variant: str, samples: int = 5068) -> CartExperiment:
 
 @dataclass(frozen=True)
 class CartRun:
-    """One way to drive the cart, and what the arm makes of it."""
+    """One way to drive the cart, and the motion of the arm with it."""
 
     method: str
     motion: CartMotion | PlaneCartMotion = field(repr=False)
     q: Array = field(repr=False)
     """(K, 7) cart [m], along x, and joints [rad], of the K ≤ M samples that the arm can follow."""
     joint_error: Array = field(repr=False)
-    """(7,) last configuration less the taught one; nan where the arm does not get there."""
+    """(7,) last configuration minus the taught configuration; nan where the arm does not arrive."""
     task_error: float
     """[m or rad] the tool's largest distance from its line, of position or orientation."""
     min_singular_value: float
@@ -133,7 +133,7 @@ class CartRun:
 
 
 def run(e: CartExperiment, method: str, iterations: int = PUBLISHED_ITERATIONS) -> CartRun:
-    """One of `METHODS`."""
+    """Drives the cart by one of `METHODS`."""
     keep = (e.flange_xy, *_CART, e.radius)
     if method == "redundancy":
         q = redundancy(e)
@@ -182,8 +182,8 @@ def cart_xy(motion: CartMotion | PlaneCartMotion) -> Array:
 def redundancy(e: CartExperiment, gain: float = 1.0, damping: float = 0.02, feedback: float = 1.0) -> Array:
     """q (M, 7) of (11), (12): q̇ = J†(ṗ + feedback · error) + gain (I − J†J) ∂w/∂q, w = −½ Σ ((q_k − mid_k)/range_k)².
 
-    J† is damped by `damping`: without, the arm runs into a singularity and the scheme stops there. The paper gives no
-    gain; feedback [1/s] of position keeps drift away.
+    J† is damped by `damping`: without damping the arm runs into a singularity and the scheme stops there. The paper
+    gives no gain; feedback [1/s] of position prevents drift.
     """
     solver = sk.VelocitySolver(sk.DampedLeastSquares(damping=damping))
     targets = e.path(e.s)
@@ -207,7 +207,7 @@ def redundancy(e: CartExperiment, gain: float = 1.0, damping: float = 0.02, feed
 
 
 def descent(e: CartExperiment, first_guess: str, stops: Sequence[int]) -> list[tuple[int, Array]]:
-    """Laws of the gradient descent (10) after some numbers of iterations, the guess first."""
+    """Laws of the gradient descent (10) after the numbers of iterations in `stops`, the guess first."""
     lower, upper = _core.forbidden_intervals(e.flange_xy, e.radius)
     x = np.linspace(*_CART, e.samples)
     if first_guess == "admissible":

@@ -31,7 +31,7 @@ def laws_figure(
 ) -> Figure:
     """Cart over time beside the forbidden region: the paper's figures 3, 4, 5 and 9, and the exact law.
 
-    linear, admissible: laws of the gradient descent after so many iterations, from either guess.
+    linear, admissible: pairs of a number of iterations and the law of the gradient descent, from either guess.
     """
     figure = empty_figure(13.0, 7.2, f"cart, {e.variant}", fontsize=12)
     panels = figure.subplots(2, 4).ravel()
@@ -83,7 +83,7 @@ def laws_figure(
 
 
 def joints_figure(e: CartExperiment, runs: Sequence[CartRun]) -> Figure:
-    """Cart and joints over time, taught values dashed: the paper's figures 6 to 8, and whatever else was run."""
+    """Cart and joints over time, taught values dashed: the paper's figures 6 to 8, and the other methods' runs."""
     figure = empty_figure(
         4.2 * len(runs), 4.2, f"cart [m] and joints [rad], {e.variant}; taught values dashed", fontsize=12
     )
@@ -108,7 +108,7 @@ def joints_figure(e: CartExperiment, runs: Sequence[CartRun]) -> Figure:
 
 
 def plane_figure(e: CartExperiment, runs: Sequence[CartRun]) -> Figure:
-    """Carts of one axis and of two from above: with the flange, seen from it, and both coordinates over time."""
+    """The cart with one axis and with two: from above, as seen from the flange, and both coordinates over time."""
     figure = empty_figure(13.0, 4.6, f"cart with one axis and with two, {e.variant}", fontsize=12)
     above, seen, over_time = figure.subplots(1, 3)
     f = e.flange_xy
@@ -124,7 +124,7 @@ def plane_figure(e: CartExperiment, runs: Sequence[CartRun]) -> Figure:
         c = cart_xy(run.motion)
         above.plot(*c.T, color=colour, linewidth=1.8, label=METHODS[run.method])
         above.plot(*c[some].T, "o", color=colour, markersize=4)
-        # The two can be one curve, run through at different speeds.
+        # Both laws can follow the same curve at different speeds.
         style = "--" if run.method == "plane" else "-"
         seen.plot(*(c - f).T, color=colour, linewidth=1.8, linestyle=style, label=METHODS[run.method])
         over_time.plot(t, c[:, 0], color=colour, linewidth=1.8, label=f"x, {METHODS[run.method]}")

@@ -102,6 +102,6 @@ def report(drive: Drive, runs: list[CartRun]) -> Report:
 
 
 def _stages(drive: Drive, guess: str) -> list[tuple[int, Array]]:
-    """The descent's laws after some numbers of iterations."""
+    """The descent's laws after several numbers of iterations."""
     stops = [n for n in (100, 1000, 10000) if n < drive.iterations] + [drive.iterations]
     return experiment.descent(drive.experiment, guess, stops)

@@ -27,7 +27,7 @@ class Drill:
     smallest_ratio: float  #: of σ_min/σ_max on the way
     largest_speed: float  #: of |q̇|/limit on the way
     broken: int  #: joints times cycles beyond a position, velocity or acceleration limit
-    error: float  #: [m] from the tool to its target at the end, back where it began
+    error: float  #: [m] from the tool to its target at the end, which is home
     episode: Episode
 
 
@@ -42,8 +42,8 @@ def drill(
 ) -> list[Drill]:
     """Drives all arms at once, each with every method, in real time: four targets, each for `seconds`.
 
-    Beyond reach ahead; to the other side of the base's axis, past the shoulder's singularity; beyond reach above; and
-    back home.
+    The targets are: beyond reach ahead; on the other side of the base's axis, past the shoulder's singularity; beyond
+    reach above; and home.
 
     robots: shipped arms or URDF files, between the links base and tip; names: methods
     progress: called with the part that is done

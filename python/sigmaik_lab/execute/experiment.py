@@ -1,5 +1,4 @@
-"""A time-optimal motion in physics: computed torque, with the true model and with a payload unknown to it; velocity
-loops."""
+"""A time-optimal motion in physics: by computed torque, with the payload known and unknown, and by velocity loops."""
 
 from __future__ import annotations
 
@@ -31,7 +30,7 @@ class ExecuteRun:
 
 
 def variants(settings: PhysicsSettings) -> tuple[str, ...]:
-    """The ways to drive it: by computed torque, which knows of a payload or does not, and by velocity loops."""
+    """The ways to drive the arm: by computed torque, with the payload known or unknown, and by velocity loops."""
     return (*(("payload unknown", "payload known") if settings.payload else ("computed torque",)), "velocity loops")
 
 

@@ -44,7 +44,7 @@ def options(parser: argparse.ArgumentParser) -> None:
         "--time-weight", type=float, default=600.0, help="of the plan's duration against its effort (%(default)g)"
     )
     motion.add_argument(
-        "--pace", type=float, default=1.0, help="the plan's speed, as a part of what it was planned for (%(default)g)"
+        "--pace", type=float, default=1.0, help="speed of the motion, as a multiple of the plan's (%(default)g)"
     )
     add_physical_arm(parser.add_argument_group("the arm in physics"))
     add_output(parser, "sigmaik-execute")

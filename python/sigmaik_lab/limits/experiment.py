@@ -1,9 +1,10 @@
 """A rule with joint limits: what limits cost, and what breaks without them.
 
-Three scenarios, each driven in several ways: a target beyond reach, targets beyond joint limits, and random
-twists like those of teleoperation. A kinematic simulation: the arm does what it is told for 1/rate.
+There are three scenarios, each driven in several ways: a target beyond reach, targets beyond joint limits, and
+random twists like those of teleoperation. The simulation is kinematic: the arm moves at the commanded velocity
+for 1/rate.
 
-Units: m, rad, s; of prismatic joints m where rad is said of joints.
+Units: m, rad, s; for prismatic joints m in place of rad.
 """
 
 from __future__ import annotations
@@ -55,7 +56,7 @@ class LimitsExperiment:
 
     @property
     def cycles(self) -> int:
-        """Of all trials together."""
+        """Number of cycles of all trials together."""
         return sum(len(trial.commands) for trials in self.trials.values() for trial in trials)
 
 
@@ -67,7 +68,7 @@ class Trace:
     scenario: str
     trial: Trial
     variant: str
-    q: Array  #: (N + 1, n) positions; the last is the end
+    q: Array  #: (N + 1, n) positions; the last one is after the last cycle
     qdot: Array  #: (N, n) commanded
     error: Array  #: (N, 6) target minus tip [m, rad]; zero for twists
     tip: Array  #: (N, 3) [m]

@@ -19,7 +19,7 @@ __all__ = ["limits_figure"]
 def limits_figure(traces: Sequence[Trace], seconds: tuple[float, float] | None = None) -> Figure:
     """Joint positions, speeds and accelerations as parts of their limits, and the tool's path, per variant.
 
-    All traces are of one trial. Limits are dashed, and what is beyond is shaded; a curve that leaves its
+    All traces are of one trial. Limits are dashed, and the range beyond is shaded; a curve that leaves its
     panel has its peak written there. seconds: from and to; None: all.
     """
     if not traces:

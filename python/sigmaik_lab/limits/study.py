@@ -42,7 +42,7 @@ error: at the end of a hold, median."""
 
 @dataclass(frozen=True)
 class Drive:
-    """An experiment, and whether its time series are wanted: they take 10 MB each."""
+    """An experiment, and whether its time series are wanted: each series takes 10 MB."""
 
     experiment: LimitsExperiment
     series: bool

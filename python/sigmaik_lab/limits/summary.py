@@ -23,14 +23,14 @@ class LimitsSummary:
     """A variant in a scenario, all trials together. A figure is NaN where no sample belongs to the figure.
 
     Broken limits are counted per joint and cycle; worst is the largest excess of positions [rad or m], and
-    the largest ratio to the limit of the others. What limits cost is measured against the rule alone in the same
+    the largest ratio to the limit of the others. The cost of limits is measured against the rule alone in the same
     state, in the cycles where limits changed the tool's motion.
     """
 
     scenario: str
     variant: str
     cycles: int
-    non_finite: int  #: cycles with a number that is none
+    non_finite: int  #: cycles with a number that is not finite
     position_broken: int
     position_excess: float  #: [rad or m]
     speed_broken: int
@@ -43,12 +43,12 @@ class LimitsSummary:
     taken_over: float  #: share of cycles in which limits changed the joints' motion, but not the tool's
     achieved: float  #: part of the rule's twist, along itself, over all cycles
     direction_error: float  #: [rad] angle between the rule's and the achieved velocity of the tool, median
-    direction_error_worst: float  #: [rad] the same, of 95 % of these cycles
+    direction_error_worst: float  #: [rad] the same angle, which 95 % of these cycles do not exceed
     turning_error: float  #: [rad/s] rotation that the rule did not ask for, root mean square
     acceleration_peak: float  #: [rad/s² or m/s²]
     acceleration_rms: float
     hold_error: float  #: [m] distance to the target at the end of a hold, median of the trials
-    hold_angle: float  #: [rad] the same of the orientation
+    hold_angle: float  #: [rad] the same for the orientation
     rest_speed: float  #: [rad/s or m/s] root mean square of q̇ at the end of a hold
     rest_speed_peak: float  #: the largest |q̇| then
     resume_time: float  #: [s] after release until a tenth of the way back is done, the longest

@@ -13,7 +13,7 @@ __all__ = ["broken_table", "cost_table", "hold_table"]
 
 
 def broken_table(rows: Sequence[LimitsSummary]) -> Table:
-    """How often limits were broken, joints times cycles, and by how much at worst. Broken ones are red."""
+    """How often limits were broken, joints times cycles, and by how much at worst. Broken limits are red."""
     table = _limits_table("limits broken")
     jerk = any(row.jerk_worst > 0.0 for row in rows)
     heads = [
@@ -39,7 +39,7 @@ def broken_table(rows: Sequence[LimitsSummary]) -> Table:
 
 
 def cost_table(rows: Sequence[LimitsSummary]) -> Table:
-    """What limits cost: how much of the rule's twist is done, and how the tool's motion differs from it."""
+    """The cost of limits: the part of the rule's twist that is done, and the tool's deviation from this twist."""
     table = _limits_table("what it costs")
     table.add_numbers(
         "limited\n%",

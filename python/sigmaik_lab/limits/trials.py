@@ -17,7 +17,7 @@ BEYOND_REACH = 0.5  #: [m]
 #: [rad or m] distance from the joint limit: of the start inside the limit, and of the target's configuration beyond it.
 BEYOND_LIMIT = 0.3
 SATURATION = (0.5, 1.5)  #: [m/s, rad/s] longest twists of the teleoperation
-BAND = 1.0  #: [Hz] and slower: what a hand does
+BAND = 1.0  #: [Hz] the highest frequency of a hand's commands
 
 
 @dataclass(frozen=True)
@@ -27,11 +27,11 @@ class LimitsSettings:
     rate: float = 1000.0  #: [Hz]
     trials: int = 3  #: directions that the target out of reach is tried in
     seconds: float = 60.0  #: of teleoperation
-    pace: float = 1.0  #: the other scenarios' times are multiplied with it
+    pace: float = 1.0  #: factor on the times of the other scenarios
     seed: int = 0
     gain_linear: float = 5.0  #: [1/s] position error to velocity
     gain_angular: float = 5.0  #: [1/s] orientation error to angular velocity
-    max_linear_error: float = 0.25  #: [m] longer errors are shortened to it
+    max_linear_error: float = 0.25  #: [m] longer errors are shortened to this length
     max_angular_error: float = 1.0  #: [rad]
     soft_start: float = 0.1  #: [s]
     acceleration: float | None = None  #: limit of all joints; None: the arm's own
@@ -81,7 +81,7 @@ def beyond_reach(chain: sk.Chain, home: Array, settings: LimitsSettings) -> Iter
     start = chain.pose(home)
     for i in range(settings.trials):
         direction = start[:3, 3] / max(1e-9, float(np.linalg.norm(start[:3, 3])))
-        if i > 0:  # the first straight on, the others to the sides
+        if i > 0:  # the first direction is straight on, the others lead to the sides
             direction = direction + rng.normal(scale=0.5, size=3)
             direction /= np.linalg.norm(direction)
         counts = [_count(settings, settings.pace * s) for s in (0.5, 8.0, 5.0, 8.0)]

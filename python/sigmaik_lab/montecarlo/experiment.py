@@ -1,13 +1,13 @@
 """The Monte Carlo study of Beck et al. (2022), section 4: what keeping clear of singularities costs, and what it
 brings.
 
-Random pairs of configurations, the same for every objective; for each the metrics (28) to (32) of the motion between
-them. A sample depends on the seed and its number alone, so that any sample can be computed anywhere, in any order: the
-study runs on whatever has the interface of `concurrent.futures.Executor`, writes each sample as it comes, and resumes
-where it was interrupted.
+The study draws random pairs of configurations, the same pairs for every objective, and computes the metrics (28) to
+(32) of the motion between them. A sample depends on the seed and its number alone, so that any sample can be computed
+anywhere, in any order: the study runs on any object with the interface of `concurrent.futures.Executor`, writes each
+sample as it comes, and resumes where it was interrupted.
 
-Two things that the paper does not do: m is also measured densely, between the nodes, where it can be orders of
-magnitude smaller; and it is counted which crossings of singular sets no path could have avoided.
+The study does two things that the paper does not do. It also samples m densely, between the nodes, where m can be
+orders of magnitude smaller; and it counts the crossings of singular sets that no path could have avoided.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ class MonteCarlo:
     avoid_weight: float = 1e2
     solver: Literal["sigmaik", "ipopt"] = "sigmaik"
     generic: bool = False
-    """m from the Jacobian, though a closed form is known."""
+    """m from the Jacobian, even where a closed form is known."""
     between_nodes: bool = False
     """Keep the limits of position between the nodes, which the paper does not ask for."""
     base: str | None = None
@@ -91,7 +91,7 @@ class MonteCarlo:
         return sk.robots.open(self.robot, self.base, self.tip).name
 
     def chain(self) -> sk.Chain:
-        """The arm. The range of a joint that turns more than twice is cut to one turn: many turns are another study."""
+        """The arm. The range of a joint that turns more than twice is cut to one turn; more turns are another study."""
         chain = sk.robots.open(self.robot, self.base, self.tip).chain
         wide = chain.limits.upper - chain.limits.lower > 4.0 * math.pi + 1e-6
         return chain.with_limits(
@@ -109,7 +109,7 @@ class Row:
     duration: float
     """[s] t_F"""
     solve_time: float
-    """[s] of the optimiser"""
+    """[s] computing time of the optimiser"""
     m_min: float
     """Least manipulability of the nodes (28)"""
     m_max: float
@@ -121,7 +121,7 @@ class Row:
     l_quat: float
     """Change of orientation (32), as printed: with Shepperd's quaternions, whose sign can jump, by about 2 each time"""
     angle: float
-    """[rad] the flange turns through, without such jumps"""
+    """[rad] angle that the flange turns through, without such jumps"""
     m_dense: float
     """Least manipulability between the nodes too"""
     unavoidable: int
@@ -183,7 +183,7 @@ def _row(chain: sk.Chain, sample: int, objective: str, plan: Trajectory) -> Row:
     poses = chain.pose(plan.q)
     rotations = poses[:, :3, :3]
     steps = rotations[1:] @ rotations[:-1].transpose(0, 2, 1)
-    # 2 sin of half the angle is the distance of the step from none, over √2: right for small angles too.
+    # ‖R − I‖ = √8 sin(angle/2), which is accurate for small angles, too.
     half = np.linalg.norm(steps - np.eye(3), axis=(1, 2)) / math.sqrt(8.0)
     quaternions = shepperd(rotations)
     return Row(
@@ -239,14 +239,14 @@ def run_study(
     advance: Callable[[int], None] = lambda n: None,
     jobs: int = 1,
 ) -> list[Row]:
-    """Computes what is missing in `file`, and returns all rows, in the order of samples.
+    """Computes the samples that are missing in `file`, and returns all rows, in the order of samples.
 
     The file is CSV, a line for each sample and objective, after a line "# " with the study as JSON. All lines of a
-    sample are written at once; what an interruption has left of a sample is computed again. Raises ValueError where the
-    file is of another study.
+    sample are written at once; a sample that an interruption left incomplete is computed again. Raises ValueError where
+    the file is of another study.
 
-    executor: takes the work; by default it is done here. `jobs`: how many pieces of work are kept waiting.
-    advance: called with the number of samples done, first with those that were in the file.
+    executor: takes the work; by default this thread does the work. `jobs`: number of workers to keep busy.
+    advance: called with the number of samples done, first with the number of samples in the file.
     """
     file = pathlib.Path(file)
     rows = _resume(study, file)

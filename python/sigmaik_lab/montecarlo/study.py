@@ -52,7 +52,7 @@ def options(parser: argparse.ArgumentParser) -> None:
         type=float,
         default=standard.time_weight,
         metavar="W",
-        help="1 as printed in the paper; with 600 durations are like its own (%(default)g)",
+        help="1 as printed in the paper; with 600 the durations are like the paper's (%(default)g)",
     )
     parser.add_argument("--nodes", type=int, default=standard.nodes, metavar="N", help="of a motion (%(default)s)")
     parser.add_argument(

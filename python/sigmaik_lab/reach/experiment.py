@@ -75,7 +75,7 @@ class Run:
     pose_error: Array  #: (N, 6) target minus tip [m, rad], base axes
     singular_values: Array  #: (N, min(6, n)), largest first
     status: NDArray[np.int8]  #: (N,) sigmaik.Status
-    scale: Array  #: (N,) what the speed limits left of the command, 1 is all
+    scale: Array  #: (N,) the part of the command that the speed limits left, 1 is the whole command
 
     @property
     def position_error(self) -> Array:
@@ -108,7 +108,7 @@ class Run:
 
     @property
     def deviation(self) -> Array | None:
-        """(N,) distance from the path's line [m]; None where it has none."""
+        """(N,) distance from the path's line [m]; None where the path has no line."""
         line = self.experiment.path.line
         return None if line is None else line.deviation(self.tip)
 
@@ -127,7 +127,7 @@ def load(
     path: a name from `names(robot)`, a file of waypoints (CSV or JSON, see `read_waypoints`), or a Path
     settings: by default the published ones of the arm, with the path's own start and posture
     base, tip: link names; by default the URDF's root, and its only leaf
-    changes: settings by name that go before all of these, where they are not None
+    changes: settings by name, which replace all of these where they are not None
     ValueError where a part is unknown, or of the wrong size for the arm.
     """
     label, chain, home, _ = sk.robots.open(robot, base, tip)

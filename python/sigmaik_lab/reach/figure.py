@@ -51,7 +51,7 @@ def reach_figure(runs: Sequence[Run], title: str | None = None) -> Figure:
     """Position error, orientation error, inverse condition number and joint speed over time, a line per run.
 
     All runs are of one experiment. Runs without and with the arm's speed limits stand side by side. Where the
-    target moves along a line, the distance from it has a panel of its own. Scales are logarithmic; waypoints
+    target moves along a line, the distance from this line has a panel of its own. Scales are logarithmic; waypoints
     are marked, as are γ and the least and the largest of the joints' speed limits.
     """
     if not runs:

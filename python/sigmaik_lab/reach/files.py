@@ -6,8 +6,8 @@ A run is an npz file with the arrays
     singular_values (N, min(6, n))   status (N,)   scale (N,)
 
 as in `Run`, and with robot, path, method, velocity_limits, joint_names, segment_names, velocity (n,) (the
-arm's speed limits), settings (JSON) and version. numpy.load(file) reads it, without pickles. Or it is a CSV
-file with a line per sample and the columns
+arm's speed limits), settings (JSON) and version. numpy.load(file) reads the file, without pickles. A run can
+also be a CSV file with a line per sample and the columns
 
     t, segment, q_<joint>…, qdot_<joint>…, target_x, target_y, target_z, error_x, error_y, error_z,
     error_rx, error_ry, error_rz, sigma_1…, status, scale

@@ -22,7 +22,7 @@ def _defaults(settings: ReachSettings | None) -> dict[str, Value]:
         "gain_linear": s.singular_gain,
         "gain_angular": s.singular_gain,
         "singular_posture": s.singular_posture,
-        # Buss and Kim let a joint turn by 45° an update, whatever the update's rate.
+        # Buss and Kim allow a joint to turn by 45° in an update, whatever the rate of the updates is.
         "max_speed": math.pi / 4.0 * s.rate,
     }
 

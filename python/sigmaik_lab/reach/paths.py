@@ -34,11 +34,11 @@ class Segment:
     name: str
     duration: float  #: [s]
     target: Callable[[float], Array]  #: time since the segment's start [s] to the target pose (4, 4)
-    pose: Array | None = None  #: the pose (4, 4), where it does not move
+    pose: Array | None = None  #: the pose (4, 4), where the target does not move
 
     @classmethod
     def hold(cls, name: str, pose: Array, duration: float) -> Segment:
-        """A pose held for a time: the target steps to it."""
+        """A pose held for a time: the target steps to this pose."""
         return cls(name, duration, lambda _: pose, pose)
 
 
@@ -191,11 +191,11 @@ def _gen3_line(_: sk.Chain) -> Path:
 
 
 def _gen3_internal(_: sk.Chain) -> Path:
-    """Axes 1 and 3 in line (q2 = 0). All figures *ours*.
+    """Axes 1 and 3 in line (q2 = 0). All figures are *ours*.
 
-    The arm loses rank there only where q3 = ±π/2 besides. So joints 1 and 3 of the published posture are
-    turned a quarter against each other; with q2 = 0 it is still the published pose. Axis 2 then swings the
-    arm sideways, through q2 = 0 in the middle of the line. x and z are those of such a pose with the elbow at
+    The Jacobian loses rank there only where q3 = ±π/2, too. Therefore joints 1 and 3 of the published posture are
+    turned by a quarter turn against each other; with q2 = 0 the pose is still the published pose. Axis 2 then swings
+    the arm sideways, through q2 = 0 in the middle of the line. x and z are those of such a pose with the elbow at
     q4 = −2.
     """
     return _sine_line(
@@ -222,7 +222,7 @@ _PUMA_STRETCHED = -math.atan2(_PUMA_D4, _PUMA_A3)
 def _puma_shoulder_lock(q3: float) -> float:
     """q2 [rad] that brings the wrist's centre over the shoulder, into the plane of axes 1 and 2.
 
-    It lies 0.15 m beside axis 1 then, the arm's shoulder offset, and cannot come closer.
+    The wrist's centre then lies 0.15 m (the arm's shoulder offset) beside axis 1, and cannot come closer.
     """
     a = _PUMA_A2 + _PUMA_A3 * math.cos(q3) - _PUMA_D4 * math.sin(q3)
     b = -_PUMA_A3 * math.sin(q3) - _PUMA_D4 * math.cos(q3)
@@ -242,8 +242,9 @@ def puma_locks() -> Mapping[str, Array]:
 def _puma_waypoints(chain: sk.Chain) -> Path:
     """(a) regular, (b) shoulder lock, (c) vertical: shoulder and elbow, (d) horizontal: elbow and wrist, (a).
 
-    The order is the paper's, the figures *ours*: each target is the pose at such a configuration, so that it
-    can be reached, and the lock is exact. 30 s each: near a target at an elbow lock the error falls as 1/t.
+    The order is the paper's, the figures are *ours*: each target is the pose at such a configuration, so that the
+    arm can reach the target, and the lock is exact. Each target lasts 30 s, because near an elbow lock the error
+    falls as 1/t.
     """
     locks = puma_locks()
     order = [*locks, "regular"]
@@ -261,7 +262,7 @@ PUMA_WRIST_LOCK = np.radians([0.0, 75.0, -195.0, 90.0, 0.0, -90.0])
 
 
 def _puma_wrist_lock(chain: sk.Chain) -> Path:
-    """θ5 = 0 twice a cycle. All figures *ours*.
+    """θ5 = 0 twice a cycle. All figures are *ours*.
 
     x, z and the orientation are those of a configuration at the lock. θ4 = 90° puts axis 5 into
     the arm's upright plane, so that joint 5 turns against joint 1 as y moves, and θ5 changes its sign.
@@ -320,7 +321,7 @@ def names(robot: str) -> tuple[str, ...]:
 
 
 def named(name: str, robot: str, chain: sk.Chain, home: Array) -> Path:
-    """The path of that name for an arm. ValueError, with the names there are, where it has none.
+    """The path of that name for an arm. ValueError, with the known names, where the arm has no such path.
 
     robot: name of a shipped arm, or anything else for an arm without figures of its own
     home: configuration (n,) that the generic path is laid around
@@ -343,13 +344,11 @@ COLUMNS = ("x", "y", "z", "roll", "pitch", "yaw", "duration")
 def read_waypoints(file: str | pathlib.Path) -> Path:
     """Waypoints from a CSV or JSON file.
 
-    CSV: a header line with the columns x, y, z [m], roll, pitch, yaw [rad, fixed axes], duration [s], in any
-        order, and,
-    if wanted, name; lines that start with # are comments.
+    CSV: a header line with the columns x, y, z [m], roll, pitch, yaw [rad, fixed axes], duration [s], in any order,
+    and optionally name; lines that start with # are comments.
 
-    JSON: a list of waypoints, or an object whose "waypoints" is that list. A waypoint is an object with the
-        same seven
-    names (and "name", if wanted), or a list of the seven numbers in that order.
+    JSON: a list of waypoints, or an object whose "waypoints" is such a list. A waypoint is an object with the same
+    seven names (and optionally "name"), or a list of the seven numbers in this order.
 
     ValueError, with the file, the waypoint and the value, where something is missing or not a number.
     """

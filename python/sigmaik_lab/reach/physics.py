@@ -1,7 +1,7 @@
 """The reaching experiments with an arm that has mass: drives, effort limits, friction, noise and delay.
 
-The arm's joints are driven every millisecond, the method runs at the experiment's rate, and between two of its cycles
-its joint velocities are held. What closes the loop is either of
+The arm's joints are driven every millisecond, the method runs at the experiment's rate, and its joint velocities are
+held between two of its cycles. One of two feedbacks closes the loop:
 
 - "reference": the servo follows its own command, as it does without physics, and the drives follow the servo, in
   position and velocity. No measurement reaches the method. The command is that of the kinematic run, to the last digit.
@@ -33,7 +33,7 @@ __all__ = ["PhysicsRun", "PhysicsSummary", "run_physics", "summarize_physics"]
 
 @dataclass(frozen=True)
 class PhysicsRun:
-    """A method without physics and with. All samples are those of the method's cycles."""
+    """A method without physics and with physics. All samples are those of the method's cycles."""
 
     kinematic: Run
     physical: Run  #: the true arm; q̇ is each joint's fastest in the cycle
@@ -49,7 +49,7 @@ class PhysicsRun:
 
     @property
     def tracking_error(self) -> Array:
-        """(N,) the largest difference of any joint between the two [rad or m]."""
+        """(N,) the largest difference of any joint between the two arms [rad or m]."""
         largest: Array = np.abs(self.kinematic.q - self.physical.q).max(axis=1)
         return largest
 
@@ -61,9 +61,9 @@ def run_physics(
     settings: PhysicsSettings | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> PhysicsRun:
-    """Runs the loop without physics, and with. Arguments as for `run`.
+    """Runs the loop without physics, and with physics. The arguments are those of `run`.
 
-    ValueError where the arm has no inertias, friction but no effort limits, or a setting is out of its range.
+    ValueError where the arm has no inertias, or friction but no effort limits, or where a setting is out of its range.
     """
     p = settings or PhysicsSettings()
     if p.feedback not in ("reference", "measured"):
@@ -139,7 +139,7 @@ class _Measured:
         self._chain, self._settings = chain, s
         self._solver = sk.VelocitySolver(method.method, length_scale=s.length_scale)
         self._limits = chain.limits.velocity if velocity_limits else np.full(chain.dof, math.inf)
-        # A continuous joint has many equal postures: take the turn nearest to the start.
+        # A continuous joint has many equal postures: this one is the turn nearest to the start.
         turning = np.array(chain.joint_types) == "continuous"
         turns = np.round((experiment.posture - experiment.start) / (2.0 * math.pi))
         self._posture = experiment.posture - np.where(turning, 2.0 * math.pi * turns, 0.0)
@@ -166,13 +166,13 @@ class _Measured:
 
 @dataclass(frozen=True)
 class PhysicsSummary:
-    """One method at one waypoint, or in one cycle of a moving target, without physics and with."""
+    """One method at one waypoint, or in one cycle of a moving target, without physics and with physics."""
 
     method: str
     velocity_limits: bool
     waypoint: str
     position_error: float  #: without physics, at the waypoint's end [m]
-    physical_position_error: float  #: with
+    physical_position_error: float  #: with physics, at the waypoint's end [m]
     orientation_error: float  #: [rad]
     physical_orientation_error: float
     max_joint_speed: float  #: [rad/s, or m/s]

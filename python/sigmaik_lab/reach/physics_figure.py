@@ -19,7 +19,7 @@ __all__ = ["physics_figure"]
 
 
 def physics_figure(runs: Sequence[PhysicsRun]) -> Figure:
-    """Position error and joint speed without physics (thin) and with; the tips' distance; torque. A line per run."""
+    """Position error and joint speed, kinematic (thin) and in physics; the tips' distance; torque. A line per run."""
     if not runs:
         raise ValueError("no run to draw")
     first = runs[0].kinematic

@@ -27,8 +27,8 @@ _HEADS = (
 def physics_table(rows: Sequence[PhysicsSummary], title: str) -> Table:
     """A line per method and waypoint, for 80 characters and more. True speeds beyond the arm's limits are red.
 
-    The settled errors, the largest joint speed, the largest distance between the tips on the way, and the part of the
-    time in which any drive was at its effort limit.
+    A line has the settled errors, the largest joint speed, the largest distance between the tips on the way, and the
+    part of the time in which any drive was at its effort limit.
     """
     table = method_table(title, "waypoint", _HEADS)
     for i, row in enumerate(rows):

@@ -1,7 +1,7 @@
 """Gains, rate and posture of the pose servo, per arm, as the J-PARSE paper's experiments have them.
 
 Figures that the paper does not print come from its authors' public code (github.com/armlabstanford/jparse);
-those chosen here are marked *ours*.
+figures chosen here are marked *ours*.
 """
 
 from __future__ import annotations
@@ -59,8 +59,8 @@ _PUBLISHED = {
         posture=(0.0, 0.26, 3.14, -2.27, 0.0, 0.96, 1.57),
         posture_gain=2.0,
     ),
-    # Rate, gains and cap *ours*: neither the paper nor the code has them. The arm is not redundant: no
-    # posture.
+    # Rate, gains and cap are *ours*: neither the paper nor the code has these figures. The arm is not redundant
+    # and has no posture.
     "puma560": ReachSettings(rate=50.0, gain_linear=5.0, gain_angular=5.0, max_position_error=0.5, singular_gain=1.0),
 }
 

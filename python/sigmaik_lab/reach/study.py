@@ -45,8 +45,8 @@ _SETTINGS = (
     ("--rate", "HZ", "control rate"),
     ("--gain-linear", "1/S", "position error to velocity"),
     ("--gain-angular", "1/S", "orientation error to angular velocity"),
-    ("--max-position-error", "M", "longer position errors are shortened to it"),
-    ("--max-orientation-error", "RAD", "longer orientation errors are shortened to it"),
+    ("--max-position-error", "M", "longer position errors are shortened to this length"),
+    ("--max-orientation-error", "RAD", "longer orientation errors are shortened to this angle"),
     ("--gamma", "Γ", "threshold of J-PARSE and its ablations on σ_i/σ_max"),
     ("--singular-gain", "K", "J-PARSE's gain in singular directions"),
     ("--posture-gain", "1/S", "pull towards the posture"),
@@ -106,8 +106,8 @@ def options(parser: argparse.ArgumentParser) -> None:
         "--feedback",
         choices=("reference", "measured"),
         default="reference",
-        help="reference: the drives follow the servo, which reads no measurements; measured: the method does, and the "
-        "drives get its joint velocities alone (%(default)s)",
+        help="reference: the drives follow the servo, which reads no measurements; measured: the method reads the "
+        "measured joints, and the drives get its joint velocities alone (%(default)s)",
     )
     add_physical_arm(group)
     add_output(parser, "sigmaik-reach", ("npz", "csv"))

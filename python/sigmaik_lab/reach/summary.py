@@ -32,8 +32,8 @@ class Summary:
     rest_speed: float  #: largest |q̇| in the waypoint's last second [rad/s, or m/s]
     max_position_error: float  #: on the way [m]
     max_orientation_error: float  #: on the way [rad]
-    max_deviation: float  #: largest distance from the path's line [m]; NaN where it has none
-    rms_deviation: float  #: root of its mean square [m]
+    max_deviation: float  #: largest distance from the path's line [m]; NaN where the path has no line
+    rms_deviation: float  #: root mean square of this distance [m]
 
 
 def summarize(run: Run) -> list[Summary]:
@@ -67,9 +67,9 @@ def summarize(run: Run) -> list[Summary]:
 
 
 def settling_time(position: NDArray[np.float64], orientation: NDArray[np.float64], rate: float) -> float:
-    """Time [s] after which both errors stay near their last values; NaN where that is in the last second.
+    """Time [s] after which both errors stay near their last values; NaN where this time is in the last second.
 
-    Near is 2 % of the largest error on the way, but at least 1 mm and 0.01 rad.
+    Near means within 2 % of the largest error on the way, but at least within 1 mm and 0.01 rad.
 
     position, orientation: errors (N,) [m, rad] from the waypoint's start, at the given rate [Hz]
     """

@@ -35,7 +35,8 @@ def summary_table(experiment: Experiment, rows: Sequence[Summary], title: str) -
 
     A waypoint's line has the settled errors, the time to settle, the largest joint speed on the way and in
     the last second, and the smallest σ_min/σ_max. A cycle's line, where the target moves along a line, has
-    the largest distance from the line and its root mean square, the largest errors, and the last two.
+    the largest distance from the line and its root mean square, the largest errors, the largest joint speed,
+    and the smallest σ_min/σ_max.
     """
     moving = experiment.path.line is not None
     table = method_table(title, "cycle" if moving else "waypoint", _MOVING_HEADS if moving else _HEADS)

@@ -2,8 +2,8 @@
 
 Every task is solved by every method. Along the motion, at 201 points, λ₁ (the smallest eigenvalue of JJᵀ), m =
 √det(JJᵀ) and κ = log₁₀(λ₆/λ₁) are averaged: the definitions that fit the paper's figures, where its text has others.
-Indices are bought with length, so that the path's length and the largest acceleration, both in unit time, stand beside
-them.
+A better index costs a longer path, so that the path's length and the largest acceleration in unit time stand beside the
+indices.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ PAPER: dict[str, dict[str, tuple[float, float, float]]] = {
 
 @dataclass(frozen=True)
 class Planning:
-    """What the planners are asked for."""
+    """The options of the planners."""
 
     states: int = 21
     samples: int = 10
@@ -75,7 +75,7 @@ class Run:
     kappa: float
     """Mean of log₁₀(λ₆/λ₁)"""
     length: float
-    """[rad] of the path in joint space"""
+    """[rad] length of the path in joint space"""
     acceleration: float
     """[rad] largest |q̈| in unit time"""
     least: float
@@ -83,7 +83,7 @@ class Run:
     solve_time: float
     """[s]"""
     joint_error: float
-    """[rad] of the largest joint at the end"""
+    """[rad] largest error of a joint at the end"""
 
 
 def task(
@@ -114,7 +114,7 @@ def solve_task(
     seed: int = 0,
     planning: Planning = Planning(),  # noqa: B008
 ) -> Run:
-    """Plans, and measures."""
+    """Plans a motion, and measures its indices."""
     begin = time.perf_counter()
     if method == "straight":
         solve_time = 0.0
@@ -169,7 +169,7 @@ _PLANNERS: dict[str, Callable[[sk.Chain, Array, Array, int, Planning], sk.planni
 
 def _task_priority(chain: sk.Chain, start: Array, goal: Array) -> Array:
     """(N, n): q̇ = J⁺ẋ + (I − J⁺J) q̇_C, the inverse damped near singularities, ẋ along the line from the start's to the
-    goal's pose, and q̇_C towards the goal's joints. It follows the tool and need not end at the goal's joints."""
+    goal's pose, and q̇_C towards the goal's joints. The tool follows the line; the joints need not end at the goal."""
     steps = 400
     solver = sk.VelocitySolver(sk.AdaptiveDampedLeastSquares())
     first, last = chain.pose(start), chain.pose(goal)
@@ -210,7 +210,7 @@ class ReachingSummary:
 
 
 def summarize_runs(runs: Sequence[Run]) -> list[ReachingSummary]:
-    """A summary a method, in the order in which they come."""
+    """A summary for each method, in the order of the runs."""
 
     def by_method() -> Iterator[tuple[str, list[Run]]]:
         for method in dict.fromkeys(run.method for run in runs):

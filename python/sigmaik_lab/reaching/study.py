@@ -20,9 +20,9 @@ __all__ = ["Tasks", "load", "options", "report", "run"]
 
 @dataclass(frozen=True)
 class Tasks:
-    """As many tasks of each arm, by several methods."""
+    """The same number of tasks for each arm, by several methods."""
 
-    robots: dict[str, str]  #: name to what `task` opens
+    robots: dict[str, str]  #: name to the name or file that `task` opens
     base: str | None
     tip: str | None
     methods: list[str]

@@ -12,7 +12,7 @@ __all__ = ["reaching_table"]
 
 
 def reaching_table(robot: str, rows: Sequence[ReachingSummary]) -> Table:
-    """A line per method; below it, dim, table 1 of Petrović et al. where that has the arm and the method."""
+    """A line per method; below it, dim, the line of table 1 of Petrović et al., where the table has one."""
     table = Table("", "")
     table.add_numbers("λ₁", "m", "κ", "length", "accel.", "least λ₁", "ms", "at goal")
     for s in rows:

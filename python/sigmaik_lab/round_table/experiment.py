@@ -29,8 +29,9 @@ class RoundTable:
 
 
 def load(seed: int = 0) -> RoundTable:
-    """A random start with the flange under the table, and a goal with it above, both 3 cm or more clear of it, not near
-    singular, and with the elbow bent to the same side: so that no motion between them has to be singular."""
+    """A random start with the flange under the table, and a random goal with the flange above the table. Both are 3 cm
+    or more clear of the table, not near singular, and have the elbow bent to the same side, so that no motion between
+    them has to be singular."""
     chain = sk.robots.load(ROBOT)
     spheres, obstacles = arm_spheres(chain), Obstacles([TABLE])
     rng = np.random.default_rng(seed)
@@ -49,7 +50,7 @@ def load(seed: int = 0) -> RoundTable:
 
 
 def plan(task: RoundTable, index: bool, seed: int = 0) -> Trajectory:
-    """A motion by samples; without the index only collisions cost, and distance from the straight line."""
+    """A motion by samples; without the index only collisions and the distance from the straight line cost."""
     return stochastic(
         task.chain,
         task.start,
@@ -64,7 +65,7 @@ def plan(task: RoundTable, index: bool, seed: int = 0) -> Trajectory:
 
 @dataclass(frozen=True)
 class Along:
-    """What a motion passes, at 10 times as many points as the planner looks at."""
+    """Indices and distances along a motion, at 10 times as many points as the planner uses."""
 
     s: Array
     """(M,) in unit time"""
@@ -78,7 +79,7 @@ class Along:
 
 
 def along(task: RoundTable, trajectory: Trajectory, points: int = 2001) -> Along:
-    """What a plan passes."""
+    """Indices and distances along a plan."""
     s = np.linspace(0.0, 1.0, points)
     q = trajectory.sample(s * trajectory.duration)[0]
     eigenvalues: Array = np.square(np.linalg.svd(task.chain.jacobian(q), compute_uv=False), dtype=np.float64)

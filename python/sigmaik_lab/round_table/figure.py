@@ -20,7 +20,7 @@ _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7")
 
 
 def round_table_figure(task: RoundTable, motions: Mapping[str, Along]) -> Figure:
-    """The arm along each motion in 3-D, start dark and goal light; below, what is passed: λ₁, m, κ, distance."""
+    """The arm along each motion in 3-D, start dark and goal light; below, λ₁, m, κ and the distance on the way."""
     figure = empty_figure(4.6 * max(len(motions), 2), 8.4)
     parts: Any = figure.subfigures(2, 1, height_ratios=(1.35, 1.0))
     upper, lower = parts

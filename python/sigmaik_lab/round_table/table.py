@@ -15,7 +15,7 @@ __all__ = ["motion_table"]
 
 
 def motion_table(plans: Mapping[str, Trajectory], motions: Mapping[str, Along]) -> Table:
-    """A line per plan; motions has those that did not fail."""
+    """A line per plan; `motions` has the plans that did not fail."""
     table = Table("", "index")
     table.add_numbers("mean λ₁", "m", "κ", "least λ₁", "m", "clear mm", "length", "ms")
     for name, plan in plans.items():

@@ -30,24 +30,26 @@ def options(parser: argparse.ArgumentParser) -> None:
     loop.add_argument("--rate", type=float, default=1000.0, metavar="HZ", help="(%(default)g)")
     loop.add_argument("--method", default="jparse", metavar="NAME[:PARAMETER=VALUE,…]", help="(%(default)s)")
     loop.add_argument("--gamma", type=float, default=0.1, metavar="Γ", help="threshold on σ/σ_max (%(default)g)")
-    loop.add_argument("--length-scale", type=float, default=1.0, metavar="M", help="1 rad weighs as much (%(default)g)")
+    loop.add_argument(
+        "--length-scale", type=float, default=1.0, metavar="M", help="1 rad weighs as much as this length (%(default)g)"
+    )
     page = parser.add_argument_group("the page")
     page.add_argument(
         "--host",
         default="127.0.0.1",
-        help="address to listen on (%(default)s: this machine only); who reaches it can drive the arm",
+        help="address to listen on (%(default)s: this machine only); anyone who reaches the address can drive the arm",
     )
     page.add_argument("--port", type=int, default=8080, help="(%(default)s)")
-    page.add_argument("--open", action="store_true", help="open it in the default browser")
-    page.add_argument("--device", choices=tuple(DEVICES), help="drive by it, too; the dead man's button must be held")
+    page.add_argument("--open", action="store_true", help="open the page in the default browser")
+    page.add_argument("--device", choices=tuple(DEVICES), help="drives the arm while its dead man's button is held")
     page.add_argument(
         "--browser-timeout",
         type=float,
         default=2.0,
         metavar="S",
-        help="without an answer from the browser for so long, the arm stops (%(default)g)",
+        help="the arm stops after this time without an answer from the browser (%(default)g)",
     )
-    page.add_argument("--for", dest="seconds", type=float, metavar="S", help="end by itself (never)")
+    page.add_argument("--for", dest="seconds", type=float, metavar="S", help="end after this time (never)")
     out = parser.add_argument_group("recordings")
     out.add_argument("--out", default="episodes", type=pathlib.Path, metavar="DIR", help="(%(default)s)")
     out.add_argument("--no-parquet", action="store_true", help="npz files only")
@@ -55,7 +57,7 @@ def options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--drill",
         action="store_true",
-        help="no page: five arms through their singularities by every method, and what the recordings say",
+        help="no page: five arms through their singularities by every method, and figures of the recordings",
     )
 
 

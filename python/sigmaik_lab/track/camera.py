@@ -1,4 +1,4 @@
-"""How a target is seen: late, noisy, some pictures without it, and some samples wrong."""
+"""A simulated camera, which sees a target late and with noise, in some pictures not at all, and in some wrongly."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ __all__ = ["Camera", "Frame", "see"]
 
 @dataclass(frozen=True)
 class Camera:
-    """How the target is seen."""
+    """The camera's rate, noise, delay and faults."""
 
     rate: float = 30.0  #: [Hz]
     noise: float = 2e-3  #: [m] standard deviation of the marker's place, each axis
@@ -25,7 +25,7 @@ class Camera:
     outliers: float = 0.03  #: share of the samples that are elsewhere, or turned over
     #: [m] from the marker to the target, along the marker's z: noise of the orientation becomes noise of the position.
     offset: float = 0.15
-    gap: tuple[float, float] | None = (0.8, 1.5)  #: from this part of the time the stream stops for so long [s]
+    gap: tuple[float, float] | None = (0.8, 1.5)  #: the stream stops after this part of the time, for this time [s]
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Frame:
 
 
 def see(poses: Array, rate: float, seed: int, camera: Camera, gap: tuple[float, float]) -> list[Frame]:
-    """What the camera sees of poses (N, 4, 4) at a rate [Hz], without the gap from one time to another [s]."""
+    """The samples that the camera makes of poses (N, 4, 4) at a rate [Hz]; none in the gap between two times [s]."""
     rng = np.random.default_rng([seed, 2])
     to_target = np.eye(4)
     to_target[2, 3] = camera.offset

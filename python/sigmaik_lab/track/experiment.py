@@ -1,8 +1,8 @@
 """A target that moves: scripted, recorded, or a hand-held marker before a camera, and an arm that follows.
 
-What the camera sees becomes samples, late, noisy, some missing and some wrong; a `sigmaik.TargetStream` makes targets
-of them, and a `sigmaik.Servo` at 1 kHz, with all limits on, follows. The camera knows where it is: its own place, and
-the marker's on the hand, are exact. A kinematic simulation: the arm does what it is told for 1/rate.
+The camera makes samples that are late and noisy, some missing and some wrong; a `sigmaik.TargetStream` makes targets
+of these samples, and a `sigmaik.Servo` at 1 kHz, with all limits on, follows. The poses of the camera in the base, and
+of the marker on the hand, are exact. The simulation is kinematic: the arm moves at the commanded velocity for 1/rate.
 
 Units: m, rad, s.
 """
@@ -47,7 +47,7 @@ MODES: dict[str, str] = {
     "predict": "TargetStream, where a Kalman filter expects it now",
 }
 START = 1.0  #: [s] that are not judged: the servo's soft start
-#: [s] that are not judged after the gap, and after the target was out of reach: the way back to it.
+#: [s] that are not judged after the gap, and after the target was out of reach: the tip's way back to the target.
 RETURN = 2.0
 #: Limits for joints whose description has none: few descriptions have jerk limits, and some no acceleration limits.
 ACCELERATION, JERK = 20.0, 1000.0
@@ -73,7 +73,7 @@ class TrackSettings:
 
 @dataclass(frozen=True)
 class TrackExperiment:
-    """An arm, a target's motion, and how it is seen."""
+    """An arm, a target's motion, and the camera that sees the target."""
 
     robot: str
     target: str
@@ -105,7 +105,7 @@ class TrackExperiment:
 
     @property
     def returning(self) -> Bools:
-        """(N,) within reach, and out of it less than RETURN before."""
+        """(N,) whether the target is within reach, and was out of reach less than RETURN before."""
         out = np.zeros(len(self.poses), dtype=np.bool_)
         for k in self.back:
             out[k : k + round(RETURN * self.settings.rate)] = True
@@ -114,7 +114,7 @@ class TrackExperiment:
 
 @dataclass(frozen=True)
 class Variant:
-    """What is compared: a rule, a mode, with the target's twist fed forward or not, with outliers or without."""
+    """One of the variants compared: a rule, a mode, with feed-forward or without, with outliers or without."""
 
     method: NamedMethod
     mode: str
@@ -141,7 +141,7 @@ class Follow:
 
     @property
     def position_error(self) -> Array:
-        """(N,) [m] from the tip to where the target truly is."""
+        """(N,) [m] from the tip to the true target."""
         error: Array = np.linalg.norm(self.experiment.poses[:, :3, 3] - self.tips[:-1, :3, 3], axis=1)
         return error
 

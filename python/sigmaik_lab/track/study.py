@@ -31,7 +31,7 @@ __all__ = ["Tracking", "load", "options", "report", "run"]
 _CAMERA = (
     ("--camera-rate", "rate", "HZ", "pictures"),
     ("--noise", "noise", "M", "standard deviation of the marker's place, each axis"),
-    ("--rotation-noise", "rotation_noise", "RAD", "of its orientation"),
+    ("--rotation-noise", "rotation_noise", "RAD", "standard deviation of the marker's orientation"),
     ("--dropout", "dropout", "PART", "of the pictures show no marker"),
     ("--delay", "delay", "S", "from the picture to the sample"),
     ("--outliers", "outliers", "PART", "of the samples are elsewhere, or turned over"),
@@ -67,7 +67,7 @@ class Tracking:
 
     @property
     def without_outliers(self) -> list[Variant]:
-        """The same modes without wrong samples, where there are any: what those move is measured against these."""
+        """The same modes without wrong samples, where there are wrong samples: the reference for their effect."""
         if not self.experiment.camera.outliers:
             return []
         return [dataclasses.replace(v, outliers=False) for v in self.by_mode if v.mode != "true"]
@@ -120,7 +120,7 @@ def load(args: argparse.Namespace) -> Iterable[Tracking]:
     experiment = load_track(args.robot, args.target, settings, camera, args.base, args.tip)
     wanted = {"on": [True], "off": [False], "both": [True, False]}[args.feedforward]
 
-    def feeds(mode: str) -> list[bool]:  # a held sample has no twist that is worth to be fed forward
+    def feeds(mode: str) -> list[bool]:  # a held sample has no twist that is worth feeding forward
         return [False] if mode == "raw" else wanted
 
     by_mode = [Variant(methods[0], mode, feed) for mode in modes for feed in feeds(mode)]
@@ -149,7 +149,7 @@ def report(tracking: Tracking, runs: dict[Variant, Follow]) -> Report:
         for text in ("", table(by["method"], "method"), "", table(by["mode"], "mode"))
     ]
     stem = f"{e.robot}-{e.target}"
-    # Of each mode one line in a figure: with feed-forward where both were run.
+    # A figure has one line for each mode: the run with feed-forward where both were run.
     first: dict[str, Variant] = {}
     for v in by_mode:
         first.setdefault(v.mode, v)

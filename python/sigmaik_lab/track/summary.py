@@ -13,7 +13,7 @@ from .experiment import Follow
 
 __all__ = ["TrackSummary", "summarize_track"]
 
-BACK = 0.1  #: [m]: so near the tip is back, whatever its lag
+BACK = 0.1  #: [m] from the target: a tip this near is back, whatever its lag is
 #: An excess below this part of the limit is the rounding of finite differences.
 TOLERANCE = 1e-7
 
@@ -26,7 +26,7 @@ class TrackSummary:
     mode: str
     feedforward: bool
     position_mean: float  #: [m] within reach
-    position_95: float  #: 95 % of the time it is less
+    position_95: float  #: [m] the error is less than this for 95 % of the time
     position_max: float
     orientation_mean: float  #: [rad] within reach
     orientation_95: float
@@ -45,14 +45,14 @@ class TrackSummary:
     jerk: float
     margin: float  #: [rad or m] the least distance from a position limit
     accepted: int  #: samples
-    refused: int  #: outliers, late ones and such as are none
+    refused: int  #: outliers, late samples, and samples that are no pose
     wrong: int  #: outliers that came; 0 in "true"
-    moved_by_outliers: float  #: [m] the tip, against the same run without them; NaN where that was not run
+    moved_by_outliers: float  #: [m] largest distance of the tip from the run without outliers; NaN without this run
     drift: float  #: [m] of the tip in the gap, from half a second after the stream is stale
 
 
 def summarize_track(run: Follow, without: Follow | None = None) -> TrackSummary:
-    """A variant's figures. without: the same without outliers."""
+    """A variant's figures. without: the same variant without outliers."""
     e, chain = run.experiment, run.experiment.chain
     limits = chain.limits
     inside, outside = e.judged & e.reachable, e.judged & ~e.reachable
@@ -96,10 +96,10 @@ def summarize_track(run: Follow, without: Follow | None = None) -> TrackSummary:
 
 
 def _delay(run: Follow) -> float:
-    """[s] the lag of the largest correlation of both velocities, by the parabola through it and its neighbours."""
+    """[s] the lag of the largest correlation of both velocities, by a parabola through three values around it."""
     e = run.experiment
     rate = e.settings.rate
-    stride = max(1, round(rate / 200.0))  # no need for more
+    stride = max(1, round(rate / 200.0))  # 200 Hz are enough
     target = np.diff(e.poses[::stride, :3, 3], axis=0)
     tip = np.diff(run.tips[:-1:stride, :3, 3], axis=0)
     counts = (e.judged & e.reachable)[::stride][:-1]
@@ -128,7 +128,7 @@ def _return_time(run: Follow) -> float:
     error, rate = run.position_error, e.settings.rate
     times = [math.nan]
     for k in e.back:
-        # Until it leaves again, or the stream stops, 5 s at most.
+        # Until the target leaves again, or the stream stops, 5 s at most.
         until = next(
             (
                 j

@@ -30,7 +30,7 @@ def headline(e: TrackExperiment) -> str:
 
 
 def error_table(rows: Sequence[TrackSummary], by: By) -> Table:
-    """Errors against the true target: mean, of 95 % of the time, largest; and the tip's delay."""
+    """Errors against the true target: mean, 95 % quantile, largest; and the tip's delay."""
     table = _table(f"{_title(rows, by)}: errors within reach and outside [mm, °]")
     table.add_numbers(
         "pos.\nmean",
@@ -56,7 +56,7 @@ def error_table(rows: Sequence[TrackSummary], by: By) -> Table:
 
 
 def motion_table(rows: Sequence[TrackSummary], by: By) -> Table:
-    """Jerk of tip and joints, limits broken, and how near they came. Red: broken limits."""
+    """Jerk of tip and joints, broken limits, and the distance from the limits. Red: broken limits."""
     table = _table(f"{_title(rows, by)}: jerk [m/s³, rad/s³], limits [%, rad]")
     table.add_numbers("tip\nrms", "\nmax", "joint\nrms", "\nmax", "bro-\nken", "speed\n", "acc.\n", "jerk\n", "room\n")
     for row in rows:
@@ -71,7 +71,7 @@ def motion_table(rows: Sequence[TrackSummary], by: By) -> Table:
 
 
 def event_table(rows: Sequence[TrackSummary]) -> Table:
-    """What became of the samples, what wrong ones moved, and whether the arm holds while the stream stops."""
+    """Samples accepted and refused, the effect of wrong samples on the tip, and its drift while the stream stops."""
     table = _table("events: samples, and how far the tip goes [mm]")
     table.add_numbers("accepted\n", "refused\n", "wrong\nones came", "moved\nby them", "drift while\nstopped")
     for row in rows:

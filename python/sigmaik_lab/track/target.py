@@ -38,7 +38,7 @@ def scripted(target: str, chain: sk.Chain, home: Array, t: Array, seed: int) -> 
     up = np.array([0.0, 0.0, 1.0])
     across = np.cross(up, outward)
     duration = float(t[-1])
-    # Whole rounds of about 5 s, up to speed in the first second and down in the last.
+    # Whole rounds of about 5 s; the target gains speed in the first second and loses speed in the last.
     ramp = np.clip(np.minimum(t, duration - t), 0.0, 1.0)
     pace = np.cumsum(_step(ramp))
     turn = 2.0 * math.pi * max(1, round(duration / 5.0)) * (pace - pace[0]) / (pace[-1] - pace[0])
@@ -67,7 +67,7 @@ def scripted(target: str, chain: sk.Chain, home: Array, t: Array, seed: int) -> 
 
 
 def _step(u: Array) -> Array:
-    """From 0 to 1 with no speed and no acceleration at both ends."""
+    """A step from 0 to 1 with no speed and no acceleration at both ends."""
     step: Array = u**3 * (10.0 - 15.0 * u + 6.0 * u * u)
     return step
 
@@ -117,7 +117,7 @@ def read_recording(file: str | pathlib.Path) -> tuple[Array, Array]:
 
 
 def play(times: Array, poses: Array, t: Array) -> Array:
-    """Poses at t: cubic in place, with the slopes of central differences, and turning at a constant rate between."""
+    """Poses at t: positions are cubic, with the slopes of central differences; turns between samples are uniform."""
     place = poses[:, :3, 3]
     slope = np.gradient(place, times, axis=0)
     at = np.clip(np.searchsorted(times, t, side="right") - 1, 0, len(times) - 2)
