@@ -2,9 +2,11 @@
 
 #include <doctest/doctest.h>
 
+#include <array>
 #include <deque>
 #include <limits>
 #include <numbers>
+#include <vector>
 
 #include <Eigen/LU>
 
@@ -18,6 +20,7 @@
 namespace {
 
 using namespace sigmaik;
+using Eigen::Array2d;
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 using test::kNan;
@@ -71,6 +74,68 @@ Pose noisy(Random& random, const Pose& pose, double linear, double angular) {
   out.translation() = pose.translation() + linear * Vector3d(random.vector(3));
   out.linear() = rotation_exp(angular * Vector3d(random.vector(3))) * pose.linear();
   return out;
+}
+
+// What a sensor sends, and when: noise, drop-outs, gaps, outliers, relocations, and steps of the sensor's clock.
+struct Arrival {
+  double at, stamp;
+  Pose pose;
+};
+
+std::vector<Arrival> bad_stream(Random& random, const TargetStreamOptions& options, double seconds) {
+  const Wander wander(random);
+  const double period = random.uniform(0.004, 0.06), delay = random.uniform(0.0, 0.1);
+  const double dropout = random.uniform(0.0, 0.5), outliers = random.uniform(0.0, 0.2);
+  const bool clean = random.chance(0.2);
+  std::vector<Arrival> arrivals;
+  Pose off = Pose::Identity();
+  double gap_until = 0.0, clock = 0.0;
+  for (double time = 0.0; time + delay < seconds; time += period) {
+    if (!clean && random.chance(0.01)) gap_until = time + random.uniform(0.0, 0.6);
+    if (!clean && random.chance(0.01)) off = random.pose(0.5);
+    if (!clean && random.chance(0.01)) clock = random.uniform(-1.0, 1.0);
+    Pose seen = noisy(random, off * wander.pose(time), options.noise_linear, options.noise_angular);
+    if (!clean && random.chance(outliers)) seen = random.pose(2.0);
+    double stamp = time + clock;
+    if (!clean && random.chance(0.05)) stamp += period * random.uniform(-3.0, 1.0);
+    if (clean || (time >= gap_until && !random.chance(dropout))) arrivals.push_back({time + delay, stamp, seen});
+  }
+  return arrivals;
+}
+
+// Largest of: the target's jerk, from second differences of the twist; its acceleration, from first differences; and
+// the distance between a step of the pose and the mean twist of the step, per dt³. One row each for linear and angular.
+struct Roughness {
+  Array2d jerk = Array2d::Zero(), acceleration = jerk, slip = jerk;
+};
+
+Roughness roughness(const TargetStreamOptions& options, const std::vector<Arrival>& arrivals, double seconds,
+                    double dt) {
+  const auto lengths = [](const Twist& x) { return Array2d(x.head<3>().norm(), x.tail<3>().norm()); };
+  TargetStream stream(options);
+  Roughness worst;
+  std::size_t next = 0;
+  Target before;
+  Twist slope = Twist::Zero();
+  int known = 0;
+  for (int cycle = 0; dt * cycle < seconds; ++cycle) {
+    for (; next < arrivals.size() && arrivals[next].at <= dt * cycle; ++next) {
+      stream.push(arrivals[next].stamp, arrivals[next].pose);
+    }
+    const Target target = stream.at(dt * cycle);
+    if (target.status == StreamStatus::Waiting) continue;
+    const Twist acceleration = (target.twist - before.twist) / dt;
+    if (known >= 1) {
+      const Twist slip = pose_error(before.pose, target.pose) - 0.5 * dt * (before.twist + target.twist);
+      worst.acceleration = worst.acceleration.max(lengths(acceleration));
+      worst.slip = worst.slip.max((lengths(slip) - 1e-14).max(0.0) / (dt * dt * dt));
+    }
+    if (known >= 2) worst.jerk = worst.jerk.max(lengths(acceleration - slope) / dt);
+    slope = acceleration;
+    before = target;
+    ++known;
+  }
+  return worst;
 }
 
 double distance(const Pose& a, const Pose& b) { return pose_error(a, b).norm(); }
@@ -236,7 +301,7 @@ TEST_CASE("for any samples pose and twist are continuous, and never faster than 
     const Wander wander(random);
     Pose off = Pose::Identity();
     const double period = random.uniform(0.004, 0.06), delay = random.uniform(0.0, 0.1);
-    // Late stamps are late by whole periods: the cubic between two samples turns faster the closer the samples are.
+    // Late stamps are late by whole periods: the curve between two samples turns faster the closer the samples are.
     const double dropout = random.uniform(0.0, 0.5), outliers = random.uniform(0.0, 0.2);
     double next = 0.0, gap_until = 0.0, now = random.uniform(-1e3, 1e9);
     const double zero = now;
@@ -269,10 +334,10 @@ TEST_CASE("for any samples pose and twist are continuous, and never faster than 
       if (!first) {
         CHECK(step.head<3>().norm() <= options.max_speed * elapsed + 1e-12);
         CHECK(step.tail<3>().norm() <= options.max_angular_speed * elapsed + 1e-12);
-        // Accelerations of d, of fading to rest, of the cubic between samples, and of d turning with ω.
+        // Accelerations of d, of fading to rest, of the curve between samples, and of d turning with ω.
         const double fade = 1.5 / (options.timeout - options.horizon);
-        const double cubic = options.mode == StreamMode::Interpolate ? 20.0 / period : 0.0;
-        const double a = elapsed * (1.0 / options.smoothing + fade + cubic + 4.0 * options.max_angular_speed) + 1e-6;
+        const double curve = options.mode == StreamMode::Interpolate ? 20.0 / period : 0.0;
+        const double a = elapsed * (1.0 / options.smoothing + fade + curve + 4.0 * options.max_angular_speed) + 1e-6;
         if (elapsed < 2e-3) {
           CHECK((target.twist - before.twist).head<3>().norm() <= a * options.max_speed);
           CHECK((step / elapsed - target.twist).head<3>().norm() <= a * options.max_speed);
@@ -290,6 +355,71 @@ TEST_CASE("for any samples pose and twist are continuous, and never faster than 
   CHECK(relocated > 100);
   CHECK(coasted > 1000);
   CHECK(stale > 1000);
+}
+
+TEST_CASE("for any samples the acceleration is continuous: shorter cycles change it less, and the jerk is bounded") {
+  constexpr std::array kCycles{2e-3, 1e-3, 5e-4};
+  std::array<double, kCycles.size()> changes{};  // of acceleration between cycles, largest of each stream, added up
+  double most_jerk = 0.0, most_acceleration = 0.0, most_slip = 0.0;
+  for (unsigned seed = 0; seed < 600; ++seed) {
+    Random random(seed);
+    CAPTURE(seed);
+    TargetStreamOptions options;
+    options.mode = kModes[seed % 3];
+    options.smoothing = random.uniform(0.02, 0.1);
+    options.latency = random.uniform(0.0, 0.15);
+    options.horizon = random.uniform(0.0, 0.2);
+    options.timeout = options.horizon + (random.chance(0.2) ? 0.0 : random.uniform(0.0, 0.3)) + 1e-3;
+    if (random.chance(0.1)) options.timeout = options.horizon + 1e-9;
+    options.max_speed = random.uniform(0.4, 2.0);
+    options.max_angular_speed = random.uniform(1.0, 6.0);
+    const std::vector<Arrival> arrivals = bad_stream(random, options, 2.0);
+    const Array2d speed(options.max_speed, options.max_angular_speed);
+    const Array2d acceleration = speed / options.smoothing;
+    const Array2d jerk = 0.5 * (std::exp(2.0) + 1.0) * acceleration / options.smoothing;
+    // The trapezoidal rule errs by dt³/12 ω̈, and the mean of ω turns as ω(t) does but for dt³/12 ω × ω̇.
+    const Array2d slip = (jerk + Array2d(0.0, 1.0) * speed * acceleration) / 12.0;
+    for (std::size_t i = 0; i < kCycles.size(); ++i) {
+      const Roughness worst = roughness(options, arrivals, 2.0, kCycles[i]);
+      CHECK((worst.jerk <= jerk * (1.0 + 1e-6)).all());
+      CHECK((worst.acceleration <= acceleration * (1.0 + 1e-6)).all());
+      CHECK((worst.slip <= slip * (1.0 + 1e-6)).all());
+      changes[i] += kCycles[i] * (worst.jerk / jerk).sum();
+      most_jerk = std::max(most_jerk, (worst.jerk / jerk).maxCoeff());
+      most_acceleration = std::max(most_acceleration, (worst.acceleration / acceleration).maxCoeff());
+      most_slip = std::max(most_slip, (worst.slip / slip).maxCoeff());
+    }
+  }
+  CHECK(changes[1] == doctest::Approx(0.5 * changes[0]).epsilon(0.1));
+  CHECK(changes[2] == doctest::Approx(0.5 * changes[1]).epsilon(0.1));
+  CHECK(most_jerk > 0.8);  // the streams were as rough as intended
+  CHECK(most_acceleration > 0.8);
+  CHECK(most_slip > 0.8);
+}
+
+TEST_CASE("a difference decays as a triple pole says, in cycles of any length") {
+  Random random(10);
+  for (int repeat = 0; repeat < 100; ++repeat) {
+    TargetStreamOptions options;
+    options.mode = StreamMode::Hold;
+    options.smoothing = random.uniform(0.01, 0.2);
+    TargetStream stream(options);
+    const double k = 0.5 * std::numbers::e / options.smoothing;
+    Pose goal = random.pose();
+    Twist way;  // short enough for no bound to act
+    way << random.uniform(0.1, 0.9) * options.max_speed / k * random.unit(3),
+        random.uniform(0.1, 0.9) * std::min(options.max_angular_speed / k, 3.0) * random.unit(3);
+    stream.reset(screw(goal, way, 1.0));
+    stream.at(0.0);
+    REQUIRE(stream.push(0.0, goal) == SampleStatus::Accepted);
+    for (double time = 0.0; time < 10.0 * options.smoothing;) {
+      time += random.uniform(0.0, options.smoothing);
+      const Target target = stream.at(time);
+      const double x = k * time, left = (1.0 + x + 0.5 * x * x) * std::exp(-x);
+      CHECK((pose_error(goal, target.pose) - left * way).norm() < 1e-12);
+      CHECK((target.twist + 0.5 * k * x * x * std::exp(-x) * way).norm() < 1e-10);
+    }
+  }
 }
 
 TEST_CASE("a stream that stops: coasts for the horizon, and rests from the timeout on") {
@@ -403,6 +533,38 @@ TEST_CASE("invalid samples and times are refused") {
   CHECK(stream.at(0.0).status == StreamStatus::Waiting);
   CHECK(stream.counts().accepted == 0);
   CHECK_THROWS_AS(stream.reset(bad), Error);
+}
+
+TEST_CASE("targets are finite and within the speeds for smoothing, latency and stamps of any size") {
+  for (unsigned seed = 0; seed < 2000; ++seed) {
+    Random random(seed);
+    CAPTURE(seed);
+    const auto any = [&random] {
+      return random.decades(random.chance(0.3) ? -300.0 : -6.0, random.chance(0.3) ? 300.0 : 3.0);
+    };
+    TargetStreamOptions options;
+    options.mode = kModes[seed % 3];
+    options.smoothing = random.chance(0.1) ? 0.0 : any();
+    options.latency = random.chance(0.1) ? 0.0 : any();
+    options.max_speed = random.decades(-6.0, 4.0);
+    options.max_angular_speed = random.decades(-6.0, 4.0);
+    options.horizon = random.chance(0.1) ? 0.0 : random.decades(-6.0, 1.0);
+    options.timeout = options.horizon * (random.chance(0.2) ? 1.0 : 1.5) + 1e-300;
+    TargetStream stream(options);
+    const Wander wander(random);
+    double stamp = 0.0, now = 0.0;
+    for (int i = 0; i < 60; ++i) {
+      stream.push(stamp, noisy(random, wander.pose(1e-3 * i), options.noise_linear, options.noise_angular));
+      stamp += random.decades(random.chance(0.5) ? -320.0 : -4.0, random.chance(0.02) ? 300.0 : -2.0);
+      now = random.chance(0.5) ? stamp : now + random.decades(random.chance(0.5) ? -320.0 : -4.0, -2.0);
+      const Target target = stream.at(now);
+      REQUIRE(is_pose(target.pose.matrix()));
+      REQUIRE(target.twist.allFinite());
+      const Twist twist = target.twist;
+      CHECK(std::hypot(twist[0], twist[1], twist[2]) <= options.max_speed * (1.0 + 1e-12));
+      CHECK(std::hypot(twist[3], twist[4], twist[5]) <= options.max_angular_speed * (1.0 + 1e-12));
+    }
+  }
 }
 
 TEST_CASE("options out of their range are refused") {

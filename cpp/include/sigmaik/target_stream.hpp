@@ -15,7 +15,7 @@ namespace sigmaik {
 /// Where the target is between samples, and after the last one.
 enum class StreamMode {
   Hold,         ///< at the last sample: for devices that send only changes
-  Interpolate,  ///< on a C¹ curve through the samples, `latency` ago: smooth and late
+  Interpolate,  ///< on a C² curve through the samples, `latency` ago: smooth and late
   Predict,      ///< where a constant-velocity Kalman filter expects it now: in time, noisier where the target turns
 };
 
@@ -24,7 +24,7 @@ struct TargetStreamOptions {
   StreamMode mode = StreamMode::Predict;  ///< how targets are made of samples
   double max_speed = 1.5;          ///< [m/s] > 0: the target is never faster. A sample that needs more is an outlier.
   double max_angular_speed = 4.0;  ///< [rad/s] > 0
-  /// [s] ≥ 0, time constant of the decay of the difference that a new sample makes; at 0 the twist jumps.
+  /// [s] ≥ 0: the difference that a new sample makes decays to a tenth in 3.9 `smoothing`; at 0 the twist jumps.
   double smoothing = 0.05;
   double latency = 0.1;                ///< [s] ≥ 0, delay of Interpolate: the sensor's delay, and one or two samples
   double horizon = 0.1;                ///< [s] ≥ 0: how long the target keeps its twist after the last sample
@@ -76,8 +76,9 @@ struct Target {
 };
 
 /// The link from a sensor to a servo: samples come at any time, late, doubled, wrong or not at all; targets go out each
-/// cycle. Pose and twist of the targets are continuous and never faster than max_speed and max_angular_speed, also when
-/// a sample arrives, when the stream stops or starts again, or when the target is found elsewhere.
+/// cycle. Pose, twist and acceleration of the targets are continuous, and the targets are never faster than max_speed
+/// and max_angular_speed, also when a sample arrives, when the stream stops or starts again, or when the target is
+/// found elsewhere.
 ///
 ///     stream.push(stamp, pose);                    // for each sample; stamp: when the sample was taken
 ///     const Target target = stream.at(now);        // each cycle, on the same clock
@@ -86,18 +87,29 @@ struct Target {
 /// A sensor's delay needs no setting: Predict looks ahead from the stamp to now. Threads that share one object need a
 /// lock.
 ///
-/// *Model.* The samples make a motion R(t): held, interpolated, or predicted. An interpolated motion is cubic between
-/// samples, in R³ and in the chart φ = log(R R_aᵀ) of the earlier sample, with the slopes of the parabola through three
-/// neighbours. A predicted motion comes from an extended Kalman filter for p, v and R, ω with ṗ = v, Ṙ = [ω]× R, errors
-/// p = p̂ + e, R = exp(η) R̂ (invariant under a change of base, Barrau and Bonnabel 2017), and an acceleration that is
-/// constant between samples. With isotropic noise, and to first order in the angle turned between samples, its
-/// covariances are 2×2 ⊗ I₃: one gain for position and one for velocity, linear and angular. After `horizon` without a
-/// sample, v and ω fade to rest by `timeout`.
+/// *Model.* The samples make a motion R(t): held, interpolated, or predicted. An interpolated motion is of fifth degree
+/// between samples, in R³ and in the chart φ = log(R R_aᵀ) of the earlier sample, with the rates and accelerations of
+/// the parabola through three neighbours at each sample. A predicted motion comes from an extended Kalman filter for p,
+/// v and R, ω with ṗ = v, Ṙ = [ω]× R, errors p = p̂ + e, R = exp(η) R̂ (invariant under a change of base, Barrau and
+/// Bonnabel 2017), and an acceleration that is constant between samples. With isotropic noise, and to first order in
+/// the angle turned between samples, its covariances are 2×2 ⊗ I₃: one gain for position and one for velocity, linear
+/// and angular. After `horizon` without a sample, v and ω fade to rest by `timeout`. Between two samples all three
+/// motions have a continuous acceleration, unless timeout equals horizon.
 ///
-/// *Output.* The target is exp(d(t)) R(t). The difference d from the motion decays as d̈ = −2ḋ/τ − d/τ², where τ is
-/// `smoothing`. When a sample changes the motion, d and ḋ start from the target of the cycle before, so neither pose
-/// nor twist jumps. The acceleration of d is at most the largest speed per τ, and steps beyond the largest speeds are
-/// shortened.
+/// *Output.* The target is exp(d(t)) R(t). The difference d from the motion has a triple pole: (D + k)³ d = 0, where D
+/// is the derivative and k = e/(2τ), with τ for `smoothing` and e = 2.718. The solution (d₀ + c₁t + c₂t²/2) e^(−kt) is
+/// exact for any cycle. When a sample changes the motion, d, ḋ and d̈ start from the target of the last cycle, so that
+/// neither pose nor twist nor acceleration jumps. A difference at rest decays to (1 + kt + (kt)²/2) e^(−kt): to a tenth
+/// in 3.9 τ, as with a double pole at 1/τ, whose acceleration would jump.
+///
+/// *Bounds.* The law is the same as w = x + 2ẋ/k + ẍ/k² for the target x: ẇ = u, and ẋ follows u through two lags 1/k.
+/// Where a free step would exceed a bound, u is the mean of the step, shortened to the largest speed V. Speeds behind
+/// lags are averages of u, so |u| ≤ V bounds the speed by V. From rest, |ẍ| ≤ V ∫|g| = 2kV/e = V/τ with the impulse
+/// response g = k²(1 − kt) e^(−kt) from u to ẍ, and likewise the jerk is at most 2(1 + 1/e²) k²V = 4.2 V/τ². Both
+/// bounds hold for the target as a whole, linear and angular. For d alone and a motion at rest, u = −z/k, where
+/// z = (D + k)² d shrinks along its own direction, so a bounded approach does not overshoot. A motion whose own
+/// u = (D + 2D²/k + D³/k²) x is longer than V is followed late: among these are fades shorter than 1.8 τ from the
+/// largest speed, and interpolated samples that noise moves apart.
 class TargetStream {
  public:
   /// \throws Error where an option is out of its range
@@ -130,6 +142,7 @@ class TargetStream {
   struct Motion {
     Pose pose = Pose::Identity();  ///< tip in base
     Twist twist = Twist::Zero();
+    Twist acceleration = Twist::Zero();  ///< derivative of the twist
   };
   // Covariance of position and velocity; each entry stands for a multiple of I₃.
   struct Covariance {
@@ -142,7 +155,7 @@ class TargetStream {
   void start(const Sample& sample) noexcept;
   void extend(const Sample& sample) noexcept;
   void correct(const Sample& sample) noexcept;
-  Twist slope(int i) const noexcept;
+  Motion knot(int i) const noexcept;
   Motion coast(const Motion& from, double seconds) const noexcept;
   Motion motion(double time) const noexcept;
   StreamStatus status(double time) const noexcept;
@@ -158,6 +171,7 @@ class TargetStream {
   Sample candidate_;  // the last refused sample
   int candidates_ = 0;
   Target last_;
+  Twist acceleration_ = Twist::Zero();  // of last_, the derivative of its twist
   double time_ = 0.0;
   bool placed_ = false, timed_ = false;  // whether last_.pose is set, and whether time_ is set
 };
