@@ -143,6 +143,10 @@ void bind_from_urdf(py::class_<Chain>& cls) {
 
 void bind_parts(py::class_<Chain>& cls) {
   cls.def_property_readonly("dof", &Chain::dof, "Number of movable joints, n.")
+      .def_property_readonly("characteristic_length", &Chain::characteristic_length,
+                             "[m] the lever arm of the joints that turn: the root mean square of the distance from a "
+                             "joint's axis\nto the tip, over these joints and over all turns of the joints after each "
+                             "(Angeles).")
       .def_property_readonly("base", &Chain::base, "Name of the base link.")
       .def_property_readonly("tip", &Chain::tip, "Name of the tip link.")
       .def_property_readonly(

@@ -105,6 +105,41 @@ void prepare(const std::string& base, std::vector<Segment>& segments) {
           "'; at most ", kMaxJoints, " are supported");
 }
 
+// See Chain::characteristic_length(). From the tip to the base: mean and second moment of the vector from a joint's
+// origin to the tip, in this joint's frame, averaged over a full turn of the joints after it.
+double lever_arm(const std::array<JointConstants, kMaxJoints>& joints, int dof, const Pose& tool,
+                 const JointLimits& limits) {
+  Eigen::Vector3d mean = tool.translation();
+  Eigen::Matrix3d moment = mean * mean.transpose();
+  double sum = 0.0;
+  int turning = 0;
+  for (int i = dof - 1; i >= 0; --i) {
+    const JointConstants& joint = joints[static_cast<std::size_t>(i)];
+    if (joint.prismatic) {
+      const bool bounded = std::isfinite(limits.lower[i]) && std::isfinite(limits.upper[i]);
+      const double middle = bounded ? 0.5 * (limits.lower[i] + limits.upper[i]) : 0.0;
+      const double range = bounded ? limits.upper[i] - limits.lower[i] : 0.0;
+      const Eigen::Vector3d slide = middle * Eigen::Vector3d::UnitZ();
+      moment += mean * slide.transpose() + slide * mean.transpose() + slide * slide.transpose();
+      moment(2, 2) += range * range / 12.0;
+      mean += slide;
+    } else {
+      const double lever = moment(0, 0) + moment(1, 1);
+      sum += lever;
+      ++turning;
+      mean = Eigen::Vector3d(0.0, 0.0, mean.z());
+      moment = Eigen::Vector3d(0.5 * lever, 0.5 * lever, moment(2, 2)).asDiagonal();
+    }
+    const Eigen::Vector3d turned = joint.rotation * mean;
+    moment = (joint.rotation * moment * joint.rotation.transpose() + turned * joint.translation.transpose() +
+              joint.translation * turned.transpose() + joint.translation * joint.translation.transpose())
+                 .eval();
+    mean = turned + joint.translation;
+  }
+  const double length = turning > 0 ? std::sqrt(sum / turning) : 0.0;
+  return length > 1e-9 ? length : 1.0;
+}
+
 }  // namespace
 
 const char* to_string(JointType type) noexcept {
@@ -160,6 +195,7 @@ Chain::Chain(std::string base, std::vector<Segment> segments) {
     ++i;
   }
   model->tool = placement;
+  model->characteristic_length = lever_arm(model->constants, n, placement, limits);
   model->base = std::move(base);
   model->segments = std::move(segments);
   model_ = std::move(model);
@@ -206,7 +242,7 @@ std::vector<std::string> Chain::missing_limits(bool velocity, bool acceleration)
                         " limit: " + consequence + "; Chain.with_limits(" + kind + "=…) gives limits");
   };
   if (velocity) look("velocity", limits().velocity, "nothing bounds how fast a command moves them");
-  if (acceleration) look("acceleration", limits().acceleration, "a command may change their velocity at once");
+  if (acceleration) look("acceleration", limits().acceleration, "10 rad/s² or m/s² are assumed (assumed_acceleration)");
   return sentences;
 }
 

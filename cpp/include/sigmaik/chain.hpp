@@ -115,6 +115,14 @@ class Chain {
   /// \throws Error where the size is wrong
   std::vector<std::string> far_outside_limits(const JointRef& q) const;
 
+  /// [m] > 0, the lever arm of the joints that turn: the root of the mean square of the distance from a joint's axis to
+  /// the tip's origin, over these joints and over all turns of the joints after each, which are taken as equally
+  /// likely. One length makes twists, Jacobians and errors homogeneous: Angeles (Fundamentals of Robotic Mechanical
+  /// Systems, 4th ed., §5.3) calls this length the characteristic length, and shows that the mean square of the lever
+  /// arms takes this place at an isotropic posture. The mean over all turns does not depend on a posture, is a closed
+  /// form, and scales with the arm. 1 where no joint moves the tip by turning.
+  double characteristic_length() const noexcept { return model_->characteristic_length; }
+
   /// Constants of the kinematics: dof() joints, then the tip's frame in the last joint's.
   const std::array<JointConstants, kMaxJoints>& constants() const noexcept { return model_->constants; }
   /// The tip in the last movable joint's frame, at any q.
@@ -129,6 +137,7 @@ class Chain {
     std::vector<std::string> warnings;
     JointLimits limits;
     int dof = 0;
+    double characteristic_length = 1.0;
     std::array<JointConstants, kMaxJoints> constants;
     Pose tool = Pose::Identity();
   };
