@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "finite.hpp"
@@ -32,6 +33,18 @@ double fastest_before(double d, double a) noexcept {
 }
 
 }  // namespace
+
+// The velocity from which a joint can stop within d, under |v'| ≤ a and |v''| ≤ j, from no acceleration to none: D⁻¹ of
+// LimitTracker::arrival(). In velocities and cycles.
+double speed_before(double d, double a, double j) noexcept {
+  if (!(j < kInfinity)) return a < kInfinity ? std::sqrt(2.0 * a * d) : kInfinity;
+  const double corner = a * a / j;
+  if (d * d * j <= corner * corner * corner) return std::cbrt(d * d * j);
+  return std::sqrt(0.25 * corner * corner + 2.0 * a * d) - 0.5 * corner;
+}
+
+// Parts of the acceleration and jerk limits that the plan of an arrival uses.
+constexpr double kArrivalAcceleration = 0.5, kArrivalJerk = 0.125;
 
 // The velocities that one joint may choose, and the limits that form the ends.
 struct LimitTracker::Window {
@@ -68,6 +81,8 @@ LimitTracker::LimitTracker(const JointLimits& limits, double dt, const LimitOpti
   require(dt > 0.0 && std::isfinite(dt), "dt = ", dt, " s must be above 0 and finite");
   require(options.recovery_speed > 0.0 && options.recovery_speed <= 1.0, "recovery_speed = ", options.recovery_speed,
           " must be above 0 and at most 1");
+  require(options.assumed_acceleration > 0.0, "assumed_acceleration = ", options.assumed_acceleration,
+          " must be above 0");
   require(n_ > 0, "there are no joints");
   const std::pair<const char*, const JointVector*> positive[] = {
       {"velocity", &limits.velocity}, {"acceleration", &limits.acceleration}, {"jerk", &limits.jerk}};
@@ -88,23 +103,45 @@ LimitTracker::LimitTracker(const JointLimits& limits, double dt, const LimitOpti
     lower_[at] = options.position ? limits.lower[i] : -kInfinity;
     upper_[at] = options.position ? limits.upper[i] : kInfinity;
     velocity_[at] = options.velocity ? limits.velocity[i] : kInfinity;
-    acceleration_[at] = options.acceleration ? limits.acceleration[i] * dt : kInfinity;
+    const double acceleration = limits.acceleration[i] < kInfinity ? limits.acceleration[i]
+                                                                   : options.assumed_acceleration;
+    acceleration_[at] = options.acceleration ? acceleration * dt : kInfinity;
     jerk_[at] = options.jerk ? limits.jerk[i] * dt * dt : kInfinity;
     recovery_[at] = options.recovery_speed * limits.velocity[i];
     if (jerk_[at] < kInfinity) with_jerk_ |= 1u << i;
   }
 }
 
-void LimitTracker::reset(const JointRef& q, const JointRef& qdot) {
+void LimitTracker::reset(const JointRef& q, const JointRef& qdot, const JointRef& qddot) {
   require(q.size() == n_, "q has ", q.size(), " entries, the limits ", n_, " joints");
   require(q.allFinite(), "q has an entry that is not finite");
   require(qdot.size() == 0 || qdot.size() == n_, "qdot has ", qdot.size(), " entries, the limits ", n_, " joints");
   require(qdot.allFinite(), "qdot has an entry that is not finite");
+  require(qddot.size() == 0 || qddot.size() == n_, "qddot has ", qddot.size(), " entries, the limits ", n_, " joints");
+  require(qddot.allFinite(), "qddot has an entry that is not finite");
+  std::array<JerkMemory, kMaxJoints> states{};
+  for (int i = 0; i < n_; ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    if (qddot.size() != 0) {
+      const double change = std::clamp(qddot[i] * dt_, -acceleration_[at], acceleration_[at]);
+      states[at].change = states[at].slope = change;
+    } else if (continues(i, q[i], qdot.size() != 0 ? qdot[i] : 0.0)) {
+      states[at] = jerk_states_[at];
+    }
+  }
+  const JointVector start = q, velocity = qdot;  // the arguments may be this tracker's own
   clear();
-  q_ = q;
-  if (qdot.size() != 0) v_ = qdot;
-  jerk_states_.fill({});
+  q_ = start;
+  if (velocity.size() != 0) v_ = velocity;
+  jerk_states_ = states;
   update();
+}
+
+bool LimitTracker::continues(int i, double q, double qdot) const noexcept {
+  if (q_.size() == 0) return false;
+  constexpr double kSame = 1e-9;
+  return std::abs(q - q_[i]) <= kSame * (1.0 + std::abs(q_[i])) &&
+         std::abs(qdot - v_[i]) <= kSame * (1.0 + std::abs(v_[i]));
 }
 
 void LimitTracker::clear() noexcept {
@@ -244,13 +281,75 @@ VelocityBounds LimitTracker::heading() const noexcept {
   out.lower.resize(n_);
   out.upper.resize(n_);
   for (int i = 0; i < n_; ++i) {
-    const double limit = velocity_[static_cast<std::size_t>(i)], above = room_above(i), below = room_below(i);
-    Window window{-limit, limit, LimitKind::Velocity, LimitKind::Velocity};
-    window.narrow(below < kInfinity ? -towards(i, below) : -kInfinity,
-                  above < kInfinity ? towards(i, above) : kInfinity, LimitKind::Position);
+    const auto at = static_cast<std::size_t>(i);
+    const auto speed = [&](double room) {
+      if (!(room < kInfinity)) return kInfinity;
+      const double most = towards(i, room);
+      if ((with_jerk_ >> i & 1u) == 0 || room < 0.0) return most;
+      return std::min(most, speed_before(room, kArrivalAcceleration * acceleration_[at], kArrivalJerk * jerk_[at]));
+    };
+    Window window{-kInfinity, kInfinity, LimitKind::None, LimitKind::None};
+    window.narrow(-speed(room_below(i)), speed(room_above(i)), LimitKind::Position);
     put(i, window, out);
   }
   return out;
+}
+
+double LimitTracker::arrival(const JointVector& qdot, double gain) const noexcept {
+  double part = 1.0;
+  for (int i = 0; i < n_; ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    const double size = std::abs(qdot[i]);
+    if (!(size > 0.0)) continue;
+    const double cap = speed_before(size / gain * per_dt_, kArrivalAcceleration * acceleration_[at],
+                                    kArrivalJerk * jerk_[at]);
+    if (size * part > cap) part = cap / size;
+  }
+  return part;
+}
+
+JointVector LimitTracker::approach(const JointVector& wanted) const noexcept {
+  // For a change of one, of the joint that needs the most time: the largest change of velocity in a cycle, and the
+  // largest change of this change.
+  double most = 1.0, more = kInfinity;
+  for (int i = 0; i < n_; ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    const double size = std::abs(wanted[i] - v_[i]);
+    if (most * size > acceleration_[at]) most = acceleration_[at] / size;
+    if (more * size > jerk_[at]) more = jerk_[at] / size;
+  }
+  JointVector out = v_;
+  double part = most;
+  for (unsigned left = with_jerk_; left != 0; left &= left - 1) {
+    const int i = std::countr_zero(left);
+    const auto at = static_cast<std::size_t>(i);
+    const double way = wanted[i] - v_[i], size = std::abs(way), sign = way < 0.0 ? -1.0 : 1.0;
+    const double last = sign * jerk_states_[at].change, jerk = jerk_[at];
+    double next = 0.0;
+    if (size > std::numeric_limits<double>::min()) {
+      next = std::min(most * size, fastest_before(size, std::min(more * size, jerk)));
+      next = std::min(next, last < 0.0 ? std::min(0.0, last + jerk) : last + more * size);
+    }
+    next = std::clamp(next, last - jerk, last + jerk);
+    if (next < part * size) part = next > 0.0 ? next / size : 0.0;
+    out[i] += sign * next;
+  }
+  for (int i = 0; i < n_; ++i) {
+    if ((with_jerk_ >> i & 1u) == 0) out[i] += part * (wanted[i] - v_[i]);
+  }
+  return out;
+}
+
+double LimitTracker::least_jerk() const noexcept {
+  double least = kInfinity;
+  for (int i = 0; i < n_; ++i) least = std::min(least, jerk_[static_cast<std::size_t>(i)] * per_dt_ * per_dt_);
+  return least;
+}
+
+double LimitTracker::least_acceleration() const noexcept {
+  double least = kInfinity;
+  for (int i = 0; i < n_; ++i) least = std::min(least, acceleration_[static_cast<std::size_t>(i)] * per_dt_);
+  return least;
 }
 
 LimitTracker::Window LimitTracker::window(int i, bool& broken) const noexcept {

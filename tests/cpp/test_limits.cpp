@@ -20,6 +20,9 @@ using test::Random;
 
 constexpr double kTolerance = 1e-9;
 
+// The limits as they are given: without an assumption about joints that have no acceleration limit.
+constexpr LimitOptions kAsGiven{.assumed_acceleration = kInfinity};
+
 double ulp(double x) { return std::nextafter(std::abs(x), kInfinity) - std::abs(x); }
 
 JointLimits no_limits(int n) {
@@ -143,7 +146,7 @@ TEST_CASE("from rest inside the limits nothing breaks them, whatever is chosen i
         start[i] = draw_position(random, limits, i);
         choosers.emplace_back(random, dt, start[i]);
       }
-      LimitTracker tracker(limits, dt);
+      LimitTracker tracker(limits, dt, kAsGiven);
       tracker.reset(start);
       Checker check(limits, dt, start, JointVector::Zero(n));
       long order = 0, moved = 0, flagged = 0, stop = 0;
@@ -192,7 +195,7 @@ TEST_CASE("from outside: acceleration and jerk hold, speed falls, the joint come
       double q = random.uniform(-half, half), qdot = 0.0;
       if (kind != 1) q = (random.chance(0.5) ? 1.0 : -1.0) * (half + random.decades(-6.0, 0.0));
       if (kind != 0) qdot = random.uniform(-3.0, 3.0) * std::min(v, 1.0);
-      LimitTracker tracker(limits, dt);
+      LimitTracker tracker(limits, dt, kAsGiven);
       tracker.reset(one(q), one(qdot));
 
       // Stop, turn round, travel and settle, a few times over.
@@ -259,7 +262,7 @@ TEST_CASE("no more is given up than necessary: a limit is reached in the least t
     if (cycles < 3.0 || cycles > 20000.0) continue;
     const bool up = random.chance(0.5);
     const double goal = up ? limits.upper[0] : limits.lower[0];
-    LimitTracker tracker(limits, dt);
+    LimitTracker tracker(limits, dt, kAsGiven);
     tracker.reset(one(goal + (up ? -distance : distance)));
     int cycle = 0;
     for (; cycle < 2.0 * cycles && std::abs(tracker.q()[0] - goal) > 1e-9 * distance; ++cycle) {
@@ -288,7 +291,7 @@ TEST_CASE("without a jerk limit: the largest velocity from which braking, cycle 
     JointLimits limits = no_limits(1);
     limits.upper[0] = room;
     limits.acceleration[0] = a;
-    LimitTracker tracker(limits, dt);
+    LimitTracker tracker(limits, dt, kAsGiven);
     tracker.reset(one(0.0), one(a * dt * 2.0 * (steps + 1.0)));  // too fast …
     CHECK(tracker.recovering() == 1);
     // … so its velocity is bounded by acceleration; the position's bound is the velocity at which a slower start meets
@@ -321,7 +324,7 @@ TEST_CASE("a jerk limit that is large enough is none") {
     if (random.chance(0.85)) limits.acceleration[0] = random.decades(-1.0, 3.0);
     JointLimits jerky = limits;
     jerky.jerk[0] = 1e9 * std::min(limits.acceleration[0], 1e3 / dt) / dt;
-    LimitTracker free(limits, dt), bound(jerky, dt);
+    LimitTracker free(limits, dt, kAsGiven), bound(jerky, dt, kAsGiven);
     const JointVector start = one(random.uniform(-half, half));
     free.reset(start);
     bound.reset(start);
@@ -355,7 +358,7 @@ TEST_CASE("bounds are continuous in the state, out of the limits too") {
       if (with_jerk) limits.jerk[0] = random.decades(-1.0, 4.0);
       const double q = random.chance(0.5) ? random.uniform(-1.5, 1.5) : random.chance(0.5) ? 1.0 : -1.0;
       const double v = random.chance(0.2) ? 0.0 : 1.5 * limits.velocity[0] * random.uniform(-1.0, 1.0);
-      LimitTracker a(limits, dt), b(limits, dt);
+      LimitTracker a(limits, dt, kAsGiven), b(limits, dt, kAsGiven);
       a.reset(one(q), one(v));
       b.reset(one(q + 1e-12 * random.normal()), one(v + 1e-12 * random.normal()));
       // Positions are divided by dt, and near limits the bounds are roots.
@@ -370,7 +373,7 @@ TEST_CASE("bounds are continuous in the state, out of the limits too") {
 TEST_CASE("which limit forms a bound") {
   JointLimits limits = no_limits(1);
   const auto kind = [&](double q, double v) {
-    LimitTracker tracker(limits, 0.01);
+    LimitTracker tracker(limits, 0.01, kAsGiven);
     tracker.reset(one(q), one(v));
     return tracker.bounds().upper_kind[0];
   };
@@ -438,6 +441,7 @@ TEST_CASE("settings and starts that make no sense are refused") {
   for (const double bad : {0.0, -1.0, kNan, kInfinity}) {
     CHECK_THROWS_AS(LimitTracker(limits, bad), Error);
     CHECK_THROWS_AS(LimitTracker(limits, 1e-3, {.recovery_speed = bad}), Error);
+    if (bad != kInfinity) CHECK_THROWS_AS(LimitTracker(limits, 1e-3, {.assumed_acceleration = bad}), Error);
   }
   CHECK_THROWS_AS(LimitTracker(JointLimits{}), Error);
   for (const double bad : {0.0, -1.0, kNan}) {
@@ -458,6 +462,114 @@ TEST_CASE("settings and starts that make no sense are refused") {
   CHECK_THROWS_AS(tracker.reset(JointVector::Zero(2), one(0.0)), Error);
   CHECK_THROWS_AS(tracker.reset(JointVector::Constant(2, kNan)), Error);
   CHECK_THROWS_AS(tracker.reset(JointVector::Zero(2), JointVector::Constant(2, kInfinity)), Error);
+  CHECK_THROWS_AS(tracker.reset(JointVector::Zero(2), JointVector::Zero(2), one(0.0)), Error);
+  CHECK_THROWS_AS(tracker.reset(JointVector::Zero(2), JointVector::Zero(2), JointVector::Constant(2, kNan)), Error);
+}
+
+TEST_CASE("a joint without an acceleration limit has the assumed one, and a joint with a limit keeps its own") {
+  JointLimits limits = no_limits(2);
+  limits.acceleration[1] = 40.0;
+  for (const double assumed : {10.0, 3.0, kInfinity}) {
+    LimitOptions options;
+    if (assumed != 10.0) options.assumed_acceleration = assumed;
+    LimitTracker tracker(limits, 0.01, options);
+    tracker.reset(JointVector::Zero(2), JointVector::Ones(2));
+    CHECK(tracker.bounds().upper[0] == 1.0 + assumed * 0.01);
+    CHECK(tracker.bounds().lower[0] == 1.0 - assumed * 0.01);
+    CHECK(tracker.bounds().upper[1] == doctest::Approx(1.4).epsilon(1e-14));
+    CHECK(tracker.bounds().lower[1] == doctest::Approx(0.6).epsilon(1e-14));
+    CHECK(tracker.least_acceleration() == doctest::Approx(std::min(assumed, 40.0)).epsilon(1e-14));
+    CHECK(tracker.bounds().upper_kind[0] == (std::isinf(assumed) ? LimitKind::None : LimitKind::Acceleration));
+  }
+  LimitTracker off(limits, 0.01, {.acceleration = false});
+  off.reset(JointVector::Zero(2));
+  CHECK(off.bounds().upper[0] == kInfinity);
+  CHECK(off.least_acceleration() == kInfinity);
+}
+
+TEST_CASE("heading bounds: position limits alone, with the room to stop, in front of the joint and behind it") {
+  Random random(12);
+  for (int run = 0; run < 2000; ++run) {
+    const double dt = random.decades(-4.0, -1.5), a = random.decades(-1.0, 3.0), half = random.decades(-3.0, 1.0);
+    JointLimits limits = no_limits(2);
+    limits.lower[0] = -half;
+    limits.upper[0] = half;
+    limits.velocity.setConstant(random.decades(-3.0, 0.0));
+    limits.acceleration.setConstant(a);
+    const double j = random.decades(0.0, 6.0);
+    for (const bool with_jerk : {false, true}) {
+      if (with_jerk) limits.jerk.setConstant(j);
+      LimitTracker tracker(limits, dt);
+      tracker.reset((JointVector(2) << random.uniform(-half, half), 0.0).finished());
+      const VelocityBounds heading = tracker.heading();
+      CHECK(heading.upper[1] == kInfinity);
+      CHECK(heading.lower[1] == -kInfinity);
+      CHECK(heading.upper_kind[1] == LimitKind::None);
+      CHECK(heading.upper_kind[0] == LimitKind::Position);
+      // Braking cycle by cycle from the bound ends on the limit; with a jerk limit the room is that of an arrival.
+      for (const bool up : {false, true}) {
+        const double room = up ? half - tracker.q()[0] : tracker.q()[0] + half;
+        const double v = up ? heading.upper[0] : -heading.lower[0];
+        double sum = 0.0;
+        if (room > 1e6 * a * dt * dt) {
+          sum = 0.5 * v * v / a + 0.5 * v * dt;  // of so many cycles, but for a cycle's change
+        } else {
+          for (double x = v; x > 0.0; x -= a * dt) sum += x * dt;
+        }
+        if (!with_jerk) {
+          CHECK(sum == doctest::Approx(room).epsilon(1e-6).scale(1e-12));
+        } else {
+          CHECK(sum <= room * (1.0 + 1e-6) + 1e-12);
+          const double half_a = 0.5 * a, eighth = 0.125 * j;
+          const double way = v <= half_a * half_a / eighth ? v * std::sqrt(v / eighth)
+                                                           : 0.5 * v * (v / half_a + half_a / eighth);
+          CHECK(way <= room * (1.0 + 1e-6) + 1e-12);
+          CHECK((way >= room * (1.0 - 1e-6) || sum >= room * (1.0 - 1e-6)));
+        }
+      }
+    }
+  }
+}
+
+TEST_CASE("reset at the place and the speed of the last cycle keeps the acceleration; elsewhere there is none") {
+  JointLimits limits = no_limits(2);
+  limits.acceleration.setConstant(5.0);
+  limits.jerk.setConstant(50.0);
+  Random random(13);
+  for (int run = 0; run < 100; ++run) {
+    LimitTracker going(limits), again(limits);
+    for (LimitTracker* tracker : {&going, &again}) tracker->reset(JointVector::Zero(2));
+    for (int cycle = 0; cycle < 300; ++cycle) {
+      JointVector a = 3.0 * random.vector(2), b = a;
+      again.reset(JointVector(again.q()), JointVector(again.qdot()));
+      CHECK((going.bounds().lower - again.bounds().lower).isZero(0.0));
+      CHECK((going.bounds().upper - again.bounds().upper).isZero(0.0));
+      going.advance(a);
+      again.advance(b);
+    }
+    LimitTracker still(limits);
+    // Joint 0 goes on, joint 1 has another velocity and so no acceleration.
+    JointVector moved = going.qdot();
+    moved[1] += 0.1;
+    again.reset(going.q(), moved);
+    still.reset(going.q(), moved);
+    CHECK(again.bounds().upper[0] == going.bounds().upper[0]);
+    CHECK(again.bounds().upper[1] == still.bounds().upper[1]);
+  }
+}
+
+TEST_CASE("reset with an acceleration: the next cycle's change differs from it by the jerk limit") {
+  JointLimits limits = no_limits(1);
+  limits.acceleration[0] = 5.0;
+  limits.jerk[0] = 50.0;
+  constexpr double dt = 1e-3;
+  for (const double acceleration : {-5.0, -2.0, 0.0, 0.7, 5.0}) {
+    LimitTracker tracker(limits, dt);
+    tracker.reset(one(0.0), one(0.4), one(acceleration));
+    const double up = std::min(5.0, acceleration + 50.0 * dt), down = std::max(-5.0, acceleration - 50.0 * dt);
+    CHECK((tracker.bounds().upper[0] - 0.4) / dt == doctest::Approx(up).epsilon(1e-6));
+    CHECK((tracker.bounds().lower[0] - 0.4) / dt == doctest::Approx(down).epsilon(1e-6));
+  }
 }
 
 TEST_CASE("reset: everything before is forgotten") {
@@ -488,7 +600,7 @@ TEST_CASE("no heap in the loop") {
   for (const int n : {1, 7, kMaxJoints}) {
     JointLimits limits = no_limits(n);
     for (int i = 0; i < n; ++i) draw_limits(random, i % 2 == 0, 1e-3, i, limits);
-    LimitTracker tracker(limits);
+    LimitTracker tracker(limits, 1e-3, kAsGiven);
     tracker.reset(JointVector::Zero(n));
     JointVector qdot = 10.0 * random.vector(n);
     const test::HeapWatch watch;

@@ -30,6 +30,12 @@
 /// limits too. Bracketing finds this v, exactly on the samples, because their sums have closed forms. As J → ∞ this is
 /// the case without a jerk limit.
 ///
+/// *The way to a velocity.* From velocity v and the change a of the last cycle to a wanted velocity, c = wanted − v
+/// away, the same D⁻¹ serves one derivative higher: the largest change from which changes can fall to zero by J dt² a
+/// cycle before the sum reaches c is D⁻¹(c) with J dt² in place of A dt. Each cycle takes the largest change that this,
+/// A dt and a + J dt² allow. All joints are in proportion to c, with the limits of the joint that needs the most time;
+/// a joint that would pass its wanted velocity brakes as hard as its own limits allow.
+///
 /// Where a limit is broken already (reset() outside it, or too fast to stop before it), acceleration and jerk are held
 /// first, because the motors can do no more, then velocity, then position: each of these comes back as fast as the
 /// limits before it allow, and then stays inside. A motion that leaves a limit is never held back. The bounds are
@@ -51,6 +57,9 @@ struct LimitOptions {
   bool velocity = true;      ///< whether the chain's velocity limits are held
   bool acceleration = true;  ///< whether the chain's acceleration limits are held
   bool jerk = true;          ///< whether the chain's jerk limits are held
+  /// [rad/s² or m/s²] > 0, the acceleration limit of a joint whose model has none: no motor changes its velocity at
+  /// once. 10 is what light arms do; their makers publish 5 to 20. Infinite: such a joint has no limit.
+  double assumed_acceleration = 10.0;
   /// In (0, 1], part of the velocity limit: the least speed at which a joint outside its position limits comes back. A
   /// joint without a velocity limit covers its way back, or 1 mm or 1 mrad if this is more, in 0.1 s.
   double recovery_speed = 0.1;
@@ -89,9 +98,12 @@ class LimitTracker {
   /// \throws Error where dt, an option or a limit is out of its range
   explicit LimitTracker(const JointLimits& limits, double dt = 1e-3, const LimitOptions& options = {});
 
-  /// Starts, or starts again, at q (n,) with q̇ = qdot (n,) and no acceleration; qdot empty: at rest.
+  /// Starts, or starts again, at q (n,) with q̇ = qdot (n,) and q̈ = qddot (n,).
+  /// \param qdot empty: at rest
+  /// \param qddot empty: a joint whose q and q̇ are those of the last cycle keeps the acceleration that the tracker
+  ///     knows; another joint has none
   /// \throws Error where a size is wrong or an entry is not finite
-  void reset(const JointRef& q, const JointRef& qdot = JointVector());
+  void reset(const JointRef& q, const JointRef& qdot = JointVector(), const JointRef& qddot = JointVector());
 
   /// Takes over the motion of another tracker with as many joints: its positions, its velocities and, of joints that
   /// have a jerk limit there, its accelerations. Limits that the other tracker did not hold are treated as after a
@@ -102,9 +114,36 @@ class LimitTracker {
   /// Bounds of the coming cycle; empty before reset().
   const VelocityBounds& bounds() const noexcept { return bounds_; }
 
-  /// The heading bounds: velocities that position and velocity limits alone allow, with room to stop. A joint needs
-  /// acceleration, and time, to reach such a velocity. lower ≤ upper. Real time.
+  /// The heading bounds: velocities that the position limits alone allow, with room to stop. A joint needs
+  /// acceleration, and time, to reach such a velocity. lower ≤ upper; infinite where there is no position limit. A
+  /// joint with a jerk limit has the room of arrival(). Real time.
   VelocityBounds heading() const noexcept;
+
+  /// How much of q̇ (n,) a motion may have that is to come to rest after q̇/gain: the largest s in [0, 1] with
+  /// s |q̇_i| ≤ D⁻¹(|q̇_i|/gain) for each joint, where D(v) is the distance of the fastest stop from v under a half of
+  /// the acceleration limit and an eighth of the jerk limit:
+  ///
+  ///     D(v) = v √(v/J)  where v ≤ A²/J,  else  v/2 (v/A + A/J).
+  ///
+  /// The motion q̇ = gain · d towards a target at the distance d then never exceeds the velocity from which it can still
+  /// stop before the target. The reserve is for the lag of approach(), which follows this velocity by a profile of its
+  /// own: on one joint no motion overshoots, for any A and J, up to 0.9 A and J/4. Real time.
+  /// \param gain [1/s] > 0
+  double arrival(const JointVector& qdot, double gain) const noexcept;
+
+  /// The coming cycle of the way from the present velocity and acceleration to the velocity `wanted` (n,) with no
+  /// acceleration left, in the least time under the acceleration and jerk limits, all joints in proportion; see
+  /// limits.hpp. The answer may be outside bounds(), where a position limit is near. Real time.
+  JointVector approach(const JointVector& wanted) const noexcept;
+
+  /// [rad/s or m/s], the velocity limit of joint i that is held; infinite where there is none.
+  double velocity_limit(int i) const noexcept { return velocity_[static_cast<std::size_t>(i)]; }
+  /// Whether a joint has a jerk limit that is held.
+  bool has_jerk() const noexcept { return with_jerk_ != 0; }
+  /// [rad/s² or m/s²], the least of the acceleration limits that are held; infinite where there is none.
+  double least_acceleration() const noexcept;
+  /// [rad/s³ or m/s³], the least of the jerk limits that are held; infinite where there is none.
+  double least_jerk() const noexcept;
 
   /// (n,) [rad/s or m/s], inside the bounds: the coming cycle of the fastest stop.
   const JointVector& stop() const noexcept { return stop_; }
@@ -144,6 +183,8 @@ class LimitTracker {
     double next = 0.0;        // the stop's velocity a cycle later
   };
 
+  // Whether joint i at q, qdot is where the last cycle left it.
+  bool continues(int i, double q, double qdot) const noexcept;
   template <int kPadded>
   bool move(JointVector& qdot) noexcept;
   template <int kPadded>
