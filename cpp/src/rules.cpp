@@ -1,5 +1,7 @@
 #include <sigmaik/rules.hpp>
 
+#include <algorithm>
+#include <cmath>
 #include <type_traits>
 
 namespace sigmaik {
@@ -32,17 +34,52 @@ void validate(const Method& method) {
       method);
 }
 
-Resolution resolve(const Method& method, const Spectrum& spectrum, const TaskVector& command,
-                   std::uint8_t angular) noexcept {
+Resolution resolve(const Method& method, const Spectrum& spectrum, const TaskVector& command, std::uint8_t angular,
+                   const Pace& pace) noexcept {
   return std::visit(
       [&]<typename R>(const R& rule) {
         if constexpr (std::is_same_v<R, CustomRule>) {
-          return rule.resolve(spectrum, command, angular);
+          return rule.resolve(spectrum, command, angular, pace);
         } else {
-          return resolve_by(rule, spectrum, command, angular);
+          return resolve_by(rule, spectrum, command, angular, pace);
         }
       },
       method);
+}
+
+namespace {
+
+// The part of the command, in (0, 1], that the joints can do at once by their velocity limits, as far as the directions
+// that are regular at `threshold` decide this: along the others the answer is J-PARSE's.
+double part_within_pace(const Spectrum& spectrum, const std::array<double, kMaxTask>& parts, double threshold,
+                        const Pace& pace) noexcept {
+  std::array<double, kMaxTask> speed{};
+  for (int i = 0; i < spectrum.size(); ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    const double regular = std::max(spectrum.sigma(i), threshold);
+    speed[at] = parts[at] * (spectrum.sigma(i) / regular) / regular;
+  }
+  const double fastest = spectrum.combine_v(speed).cwiseAbs().cwiseProduct(pace.slowness).maxCoeff();
+  return fastest > 1.0 ? 1.0 / fastest : 1.0;
+}
+
+}  // namespace
+
+double detail::needed(const Spectrum& spectrum, const std::array<double, kMaxTask>& parts, double threshold,
+                      const Pace& pace) noexcept {
+  double square = 0.0;
+  JointVector motion;  // Σ (share v_ij)²
+  for (int i = spectrum.size() - 1; i >= 0 && spectrum.sigma(i) < threshold; --i) {
+    const double share = std::min(1.0, 4.0 * (1.0 - spectrum.sigma(i) / threshold));
+    const double part = share * parts[static_cast<std::size_t>(i)];
+    square += part * part;
+    if (motion.size() == 0) motion = JointVector::Zero(spectrum.cols());
+    motion += (share * spectrum.v(i)).cwiseAbs2();
+  }
+  if (square == 0.0) return 0.0;
+  const double size = part_within_pace(spectrum, parts, threshold, pace) * std::sqrt(square);
+  const double fastest = std::sqrt(motion.cwiseProduct(pace.slowness.cwiseAbs2()).maxCoeff());
+  return std::max(size * fastest, std::sqrt(pace.lag * size));
 }
 
 }  // namespace sigmaik

@@ -67,6 +67,14 @@ VelocitySolver::VelocitySolver(const Method& method, double length_scale, const 
   task.validate();
 }
 
+void VelocitySolver::set_pace(const Pace& pace) {
+  detail::require(std::isfinite(pace.lag) && pace.lag >= 0.0, "pace.lag = ", pace.lag,
+                  " must be finite and at least 0");
+  detail::require(pace.slowness.allFinite() && (pace.slowness.array() >= 0.0).all(),
+                  "an entry of pace.slowness is negative or not finite");
+  pace_ = pace;
+}
+
 void VelocitySolver::set_method(const Method& method) {
   validate(method);
   method_ = method;
@@ -78,7 +86,10 @@ Solution VelocitySolver::solve(const TaskJacobianRef& jacobian, const TaskRef& t
   const Question question{jacobian, twist, posture, rotation, angular_rows(task_), selects(jacobian)};
   TaskVector command = twist;
   if (!weighted(question, command)) return refuse(jacobian);
-  return answer(question, command, sigmaik::resolve(method_, spectrum_, command, question.angular));
+  // A Jacobian of another number of joints is not the pace's arm.
+  const bool paced = pace_.slowness.size() == jacobian.cols();
+  resolution_ = sigmaik::resolve(method_, spectrum_, command, question.angular, paced ? pace_ : Pace{});
+  return answer(question, command);
 }
 
 bool VelocitySolver::selects(const TaskJacobianRef& jacobian) const noexcept {
@@ -105,35 +116,39 @@ bool VelocitySolver::weighted(const Question& question, TaskVector& command) noe
     rows = select_rows(task_, question.rotation, Jacobian(question.jacobian));
     command = select_rows(task_, question.rotation, Twist(question.twist));
   }
+  // Column by column, as the numbers lie in memory; a row that is linear has the factor 1.
+  TaskVector factor = TaskVector::Ones(rows.rows());
   for (int row = 0; row < rows.rows(); ++row) {
-    if ((question.angular >> row & 1u) == 0) continue;
-    rows.row(row) *= length_scale_;
-    command[row] *= length_scale_;
+    if ((question.angular >> row & 1u) != 0) factor[row] = length_scale_;
   }
-  if (!rows.allFinite() || !command.allFinite()) return false;
+  command = command.cwiseProduct(factor);
+  for (Eigen::Index j = 0; j < rows.cols(); ++j) {
+    for (Eigen::Index i = 0; i < rows.rows(); ++i) rows(i, j) *= factor[i];
+  }
+  if (!finite(TaskJacobianRef(rows)) || !finite(command)) return false;
   spectrum_.decompose(rows);
   return true;
 }
 
-Solution VelocitySolver::answer(const Question& question, const TaskVector& command,
-                                Resolution resolution) const noexcept {
+Solution VelocitySolver::answer(const Question& question, const TaskVector& command) const noexcept {
   Solution s;
   double largest = command.cwiseAbs().maxCoeff();  // of the command and of what the posture asks for
   if (question.posture.size() != 0) {
     largest = std::max(largest, spectrum_.sigma(0) * question.posture.cwiseAbs().maxCoeff());
     const std::array<double, kMaxTask> along = spectrum_.along_v(question.posture);
-    for (std::size_t i = 0; i < along.size(); ++i) resolution.speed[i] -= resolution.projector[i] * along[i];
-    s.qdot = question.posture + spectrum_.combine_v(resolution.speed);
+    std::array<double, kMaxTask> speed = resolution_.speed;
+    for (std::size_t i = 0; i < along.size(); ++i) speed[i] -= resolution_.projector[i] * along[i];
+    s.qdot = question.posture + spectrum_.combine_v(speed);
   } else {
-    s.qdot = spectrum_.combine_v(resolution.speed);
+    s.qdot = spectrum_.combine_v(resolution_.speed);
   }
   s.achieved_twist = product(question.jacobian, s.qdot);
   if (!finite(s.qdot) || !finite(s.achieved_twist) || !std::isfinite(spectrum_.sigma(0))) {
     return refuse(question.jacobian);  // the answer overflows
   }
 
-  s.status = resolution.exact && exact(question, s.achieved_twist, kExact * largest) ? Status::Ok : Status::Damped;
-  s.singular = resolution.singular;
+  s.status = resolution_.exact && exact(question, s.achieved_twist, kExact * largest) ? Status::Ok : Status::Damped;
+  s.singular = resolution_.singular;
   s.singular_values.resize(spectrum_.size());
   for (int i = 0; i < spectrum_.size(); ++i) s.singular_values[i] = spectrum_.sigma(i);
   if (question.jacobian.rows() == 6 && !question.select) {

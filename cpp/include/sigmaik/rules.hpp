@@ -68,7 +68,8 @@ void validate(const Method& method);
 /// Applies the method. Real time.
 /// \param command (m,) in the rows of the spectrum
 /// \param angular bit i: row i of the command is angular, for JParse's gains
-Resolution resolve(const Method& method, const Spectrum& spectrum, const TaskVector& command,
-                   std::uint8_t angular) noexcept;
+/// \param pace for JParse::adaptive and for an application's rules that need the pace
+Resolution resolve(const Method& method, const Spectrum& spectrum, const TaskVector& command, std::uint8_t angular,
+                   const Pace& pace = {}) noexcept;
 
 }  // namespace sigmaik

@@ -48,6 +48,11 @@ class VelocitySolver {
   /// Forgets the warm start: the next answer does not depend on the calls before it.
   void reset() noexcept { spectrum_ = Spectrum{}; }
 
+  /// How fast the arm can go, for rules whose threshold grows with the command (JParse::adaptive). Without a pace these
+  /// rules have their published thresholds.
+  /// \throws Error where an entry is negative or not finite
+  void set_pace(const Pace& pace);
+
   /// Changes the rule; the warm start stays.
   /// \throws Error where a parameter is out of its range
   void set_method(const Method& method);
@@ -60,6 +65,10 @@ class VelocitySolver {
   const Task& task() const noexcept { return task_; }
   /// Decomposition of the last solve().
   const Spectrum& spectrum() const noexcept { return spectrum_; }
+  /// What the rule said of each direction of spectrum() in the last solve().
+  const Resolution& resolution() const noexcept { return resolution_; }
+  /// As given to set_pace().
+  const Pace& pace() const noexcept { return pace_; }
 
  private:
   // The arguments of solve(), and their meaning for the task.
@@ -78,14 +87,16 @@ class VelocitySolver {
   // Decomposes the task's rows, angular ones times length_scale; `command` becomes the twist in these rows. false where
   // a number overflows.
   bool weighted(const Question& question, TaskVector& command) noexcept;
-  Solution answer(const Question& question, const TaskVector& command, Resolution resolution) const noexcept;
+  Solution answer(const Question& question, const TaskVector& command) const noexcept;
   // Whether the answer misses at most `tolerance` of the command, in the task's weighted rows.
   bool exact(const Question& question, const TaskVector& achieved, double tolerance) const noexcept;
 
   Method method_;
   double length_scale_;
   Task task_;
+  Pace pace_;
   Spectrum spectrum_;
+  Resolution resolution_;
 };
 
 SIGMAIK_SAME_LAYOUT(VelocitySolver, Method, Solution);

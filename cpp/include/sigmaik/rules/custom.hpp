@@ -46,8 +46,9 @@ class CustomRule {
   /// In (0, 1]: a direction with σ_i at or below this part of σ_max is near a singularity.
   double relative_threshold() const noexcept { return functions_->relative_threshold(bytes_.data()); }
   /// Applies the rule, see resolve(). Real time.
-  Resolution resolve(const Spectrum& spectrum, const TaskVector& command, std::uint8_t angular) const noexcept {
-    return functions_->resolve(bytes_.data(), spectrum, command, angular);
+  Resolution resolve(const Spectrum& spectrum, const TaskVector& command, std::uint8_t angular,
+                     const Pace& pace = {}) const noexcept {
+    return functions_->resolve(bytes_.data(), spectrum, command, angular, pace);
   }
   /// The struct where it is an R, else null.
   template <Rule R>
@@ -60,7 +61,7 @@ class CustomRule {
     const char* name;
     void (*check)(const std::byte*);
     double (*relative_threshold)(const std::byte*) noexcept;
-    Resolution (*resolve)(const std::byte*, const Spectrum&, const TaskVector&, std::uint8_t) noexcept;
+    Resolution (*resolve)(const std::byte*, const Spectrum&, const TaskVector&, std::uint8_t, const Pace&) noexcept;
   };
 
   template <typename R>
@@ -71,9 +72,8 @@ class CustomRule {
   static constexpr Functions kFunctions{
       R::kName, [](const std::byte* bytes) { check_rule(*from<R>(bytes)); },
       [](const std::byte* bytes) noexcept { return from<R>(bytes)->relative_threshold(); },
-      [](const std::byte* bytes, const Spectrum& spectrum, const TaskVector& command, std::uint8_t angular) noexcept {
-        return resolve_by(*from<R>(bytes), spectrum, command, angular);
-      }};
+      [](const std::byte* bytes, const Spectrum& spectrum, const TaskVector& command, std::uint8_t angular,
+         const Pace& pace) noexcept { return resolve_by(*from<R>(bytes), spectrum, command, angular, pace); }};
 
   const Functions* functions_;
   alignas(double) std::array<std::byte, kMaxSize> bytes_{};

@@ -19,6 +19,11 @@ struct JParse {
   /// is (σ_i/(γσ_max))². An arm that was stretched out then folds back to the side of its posture. false: p_i = 1, as
   /// published.
   bool singular_posture = false;
+  /// Whether the threshold grows with what is asked along the direction: min(γσ_max, the σ_i that the command needs, by
+  /// the velocity and acceleration limits of the arm (SpectrumSummary::needed)). A Servo then is exact up to the
+  /// neighbourhood of a singularity that matters for this command, and comes to rest beyond reach. Without a Pace
+  /// (VelocitySolver), or false: γσ_max, as published.
+  bool adaptive = true;
 
   /// Name of the class.
   static constexpr const char* kName = "JParse";
@@ -44,7 +49,10 @@ struct JParse {
         param("singular_posture", &JParse::singular_posture,
               "the posture acts along singular directions, as far as J-PARSE's own inverse does not, by its "
               "I − J⁺J: an arm that was stretched out folds back to the side of its posture. False: the posture "
-              "does not act there, as published.")};
+              "does not act there, as published."),
+        param("adaptive", &JParse::adaptive,
+              "the threshold is min(γσ_max, the σ_i that the command along u_i needs to stay within the arm's velocity "
+              "and acceleration limits); False, and in a VelocitySolver: γσ_max, as published.")};
   }
 
   /// In (0, 1]: a direction with σ_i at or below this part of σ_max is near a singularity.
@@ -53,10 +61,12 @@ struct JParse {
   RowGains row_gains() const noexcept { return {gain_linear, gain_angular}; }
   /// What the rule does with a direction of singular value `sigma`.
   Direction at(double sigma, const SpectrumSummary& spectrum) const noexcept {
-    const double threshold = gamma * spectrum.largest;
-    if (sigma > threshold) return {1.0 / sigma, 1.0, true};
+    double threshold = gamma * spectrum.largest;
+    if (adaptive) threshold = std::min(threshold, std::max(spectrum.needed, kRankTolerance * spectrum.largest));
+    if (sigma > threshold) return {1.0 / sigma, 1.0, true, 0.0, sigma};
     const double share = sigma / threshold;
-    return {share / threshold, singular_posture ? share * share : 1.0, false, continuous ? 1.0 - share : 1.0};
+    return {share / threshold, singular_posture ? share * share : 1.0, false, continuous ? 1.0 - share : 1.0,
+            threshold};
   }
 };
 

@@ -12,6 +12,7 @@
 #include <cmath>
 #include <concepts>
 #include <cstdint>
+#include <limits>
 
 #include <sigmaik/error.hpp>
 #include <sigmaik/parameters.hpp>
@@ -33,17 +34,36 @@ struct Direction {
   bool regular = true;     ///< false: the direction counts as singular in the answer
   /// w in [0, 1], for rules with row_gains(): the command along u_i is u_iᵀ(I + w (K − I))ẋ.
   double gain_weight = 0.0;
+  /// How much motion along v_i counts, in the unit of σ. Negative: √(σ_i/inverse), see Resolution::weight.
+  double weight = -1.0;
+};
+
+/// How fast the joints can go, and how fast they can turn round. A rule whose threshold grows with the command
+/// (JParse::adaptive) needs these two numbers; a Servo takes them from the arm's limits.
+struct Pace {
+  JointVector
+      slowness{};  ///< (n,) 1/V_j [s/rad or s/m], 0 where joint j has no velocity limit; empty: there is no pace
+  /// [m·s], length scale over ω, the bandwidth [rad/s] that the acceleration limits allow.
+  double lag = 0.0;
+  /// σ_max > 0 that relative thresholds refer to, where this is more than the largest of the spectrum: for the rows of
+  /// a task that have what other rows left.
+  double largest = 0.0;
 };
 
 /// Data of the whole spectrum, for a rule that needs more than its own σ_i.
 class SpectrumSummary {
  public:
   /// The spectrum must have at least one direction and must outlive the summary.
-  explicit SpectrumSummary(const Spectrum& spectrum) noexcept
-      : largest(spectrum.sigma(0)), smallest(spectrum.sigma(spectrum.size() - 1)), spectrum_(&spectrum) {}
+  explicit SpectrumSummary(const Spectrum& spectrum, double reference = 0.0) noexcept
+      : largest(std::max(spectrum.sigma(0), reference)),
+        smallest(spectrum.sigma(spectrum.size() - 1)),
+        spectrum_(&spectrum) {}
 
   const double largest;   ///< σ_max > 0
   const double smallest;  ///< σ_min ≥ 0
+  /// The least σ_i at which the command along the directions near a singularity stays within the Pace. Infinite where
+  /// there is no pace, 0 where nothing is asked along these directions.
+  double needed = std::numeric_limits<double>::infinity();
 
   /// Π σ_i / unit over all directions. Computed once.
   double manipulability(double unit) const noexcept {
@@ -107,8 +127,11 @@ concept ClampingRule = Rule<R> && requires(const R rule, const Spectrum& spectru
 struct Resolution {
   std::array<double, kMaxTask> speed{};      ///< g_i: q̇ = Σ g_i v_i; 0 beyond size()
   std::array<double, kMaxTask> projector{};  ///< p_i of the posture; 0 beyond size()
-  std::uint8_t singular = 0;                 ///< bit i: the rule does not treat direction u_i as regular
-  bool exact = true;                         ///< every direction that the command uses is done in full
+  /// w_i > 0, in the unit of σ: along v_i, without a posture, the rule's answer minimises ½(w_i v_iᵀq̇)² − ẋᵀJ q̇. A
+  /// regular direction has σ_i. 0 beyond size().
+  std::array<double, kMaxTask> weight{};
+  std::uint8_t singular = 0;  ///< bit i: the rule does not treat direction u_i as regular
+  bool exact = true;          ///< every direction that the command uses is done in full
 };
 
 namespace detail {
@@ -137,16 +160,29 @@ inline Direction truncated(double sigma, bool keep, double projector_if_dropped)
 
 }  // namespace detail
 
+namespace detail {
+
+// SpectrumSummary::needed: with c the length of the command along the directions whose σ_i is below `threshold`, the σ
+// at which c/σ keeps each joint within its velocity limit, and at which the answer does not change faster than ω: σ_i
+// falls by about L for each radian along v_i, so the loop that closes through σ_i has a gain of (c/σ²) L. One number
+// for all directions, so that the answer does not depend on the choice of u_i and v_i where two σ_i are the same. A
+// direction counts in full from 3/4 of `threshold` downwards, and not at all from `threshold` upwards.
+double needed(const Spectrum& spectrum, const std::array<double, kMaxTask>& parts, double threshold,
+              const Pace& pace) noexcept;
+
+}  // namespace detail
+
 /// Applies one rule that is known at compile time. Real time.
 /// \param command (m,) in the rows of the spectrum
 /// \param angular bit i: row i of the command is angular
+/// \param pace for rules whose threshold grows with the command
 template <Rule R>
-Resolution resolve_by(const R& rule, const Spectrum& spectrum, const TaskVector& command,
-                      std::uint8_t angular) noexcept {
+Resolution resolve_by(const R& rule, const Spectrum& spectrum, const TaskVector& command, std::uint8_t angular,
+                      const Pace& pace = {}) noexcept {
   const int m = spectrum.rows(), size = spectrum.size();
   Resolution out;
   const double enough = detail::kExact * command.cwiseAbs().maxCoeff();  // the squares in a norm overflow or vanish
-  const SpectrumSummary summary(spectrum);
+  SpectrumSummary summary(spectrum, pace.largest);
   const std::array<double, kMaxTask> parts = spectrum.along_u(command);
 
   // If m > n, no joint can move the tip along the u_i beyond the n-th.
@@ -169,11 +205,13 @@ Resolution resolve_by(const R& rule, const Spectrum& spectrum, const TaskVector&
       amplified = spectrum.along_u(product);
     }
   }
+  const double lightest = rule.relative_threshold() * summary.largest;
+  if (pace.slowness.size() != 0) summary.needed = detail::needed(spectrum, parts, lightest, pace);
   for (int i = 0; i < size; ++i) {
     const auto at = static_cast<std::size_t>(i);
     const double sigma = spectrum.sigma(i);
-    const Direction direction = rule.at(sigma, summary);
     const double part = parts[at];
+    const Direction direction = rule.at(sigma, summary);
     double speed = direction.inverse * (part + direction.gain_weight * (amplified[at] - part));
     bool regular = direction.regular;
     if constexpr (ClampingRule<R>) {
@@ -188,6 +226,9 @@ Resolution resolve_by(const R& rule, const Spectrum& spectrum, const TaskVector&
     }
     out.speed[at] = speed;
     out.projector[at] = direction.projector;
+    out.weight[at] = direction.weight >= 0.0   ? direction.weight
+                     : direction.inverse > 0.0 ? std::sqrt(sigma / direction.inverse)
+                                               : std::max(sigma, lightest);
     if (!regular) out.singular |= static_cast<std::uint8_t>(1u << i);
     if (std::abs(sigma * speed - part) > enough) out.exact = false;
   }
