@@ -49,9 +49,10 @@ test-clang test-asan test-tsan: test-%: .venv/.build
 	cmake --build --preset $*
 	ctest --preset $*
 
-stress: build/release/build.ninja  ## ten million random cycles into every limit: counts of what broke, which is nothing
-	cmake --build build/release --target sigmaik_stress
+stress: build/release/build.ninja  ## ten million random cycles into every limit, 1e5 targets to settle at: counts of what failed
+	cmake --build build/release --target sigmaik_stress sigmaik_settling
 	build/release/sigmaik_stress 1e7 1 2
+	build/release/sigmaik_settling 1e5 1 2
 
 bench: .venv/.bench .venv/.package build/release/build.ninja  ## all benchmarks and the peers: one table, build/bench/bench.json
 	cmake build/release  # finds the solvers that .venv has

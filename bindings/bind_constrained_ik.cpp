@@ -90,7 +90,7 @@ void bind_setup(py::class_<ConstrainedIk>& c) {
                                  "Warns (ModelWarning) of velocity and acceleration limits that joints lack.",
                                  [](const Chain& chain, const ConstrainedIkOptions& options) {
                                    ConstrainedIk ik(chain, options);
-                                   warn(chain.missing_limits(options.limits.velocity, options.limits.acceleration));
+                                   warn(missing_limits(chain, options.limits));
                                    return ik;
                                  });
   def_options(c);

@@ -61,6 +61,9 @@ void bind_step(py::module_& m) {
           "The twist [v; ω], base axes, at the tip's origin, that has u_i in the rows of the task and zero in the "
           "rows\n"
           "that the mask leaves out: |v|² + (length_scale |ω|)² = 1. The sign means nothing. None while holding.")
+      .def_readonly("not_settling", &ServoStep::not_settling,
+                    "The target has rested for longer than any motion takes (Servo.settling_time), and the arm still "
+                    "moves.")
       .def("__repr__", [](const ServoStep& s) {
         return std::string("ServoStep(status=") + to_string(s.status) +
                ", qdot=" + py::str(to_numpy(s.qdot)).cast<std::string>() + ")";
@@ -68,26 +71,57 @@ void bind_step(py::module_& m) {
 }
 
 void bind_setup(py::class_<Servo>& c) {
-  def_init<ServoOptions>(c, std::tuple{parameter<Chain>("chain"), parameter<Method>("method")}, 1,
-                         "Warns (ModelWarning) of velocity and acceleration limits that joints lack.",
-                         [](const Chain& chain, const Method& method, const ServoOptions& options) {
-                           Servo servo(chain, method, options);
-                           warn(chain.missing_limits(options.limits.velocity, options.limits.acceleration));
-                           return servo;
-                         });
+  def_init<ServoOptions>(
+      c,
+      std::tuple{parameter<Chain>("chain"),
+                 parameter<std::optional<Method>>("method", "None: JParse(), the best that there is.")},
+      1, "Warns (ModelWarning) of velocity and acceleration limits that joints lack.",
+      [](const Chain& chain, const std::optional<Method>& method, const ServoOptions& options) {
+        Servo servo(chain, method.value_or(JParse{}), options);
+        warn(missing_limits(chain, options.limits));
+        return servo;
+      });
   def_options(c);
   c.def(
       "reset",
-      [](Servo& s, const ArrayLike& q, const MaybeArray& qdot) {
-        const JointVector start = joint_argument(q, "q", s.chain().dof());
-        s.reset(start, optional_joint_argument(object_of(qdot), "qdot", s.chain().dof()));
+      [](Servo& s, const ArrayLike& q, const MaybeArray& qdot, const MaybeArray& qddot) {
+        const int n = s.chain().dof();
+        const JointVector start = joint_argument(q, "q", n);
+        s.reset(start, optional_joint_argument(object_of(qdot), "qdot", n),
+                optional_joint_argument(object_of(qddot), "qddot", n));
         if (s.options().limits.position) warn(s.chain().far_outside_limits(start));
       },
-      py::arg("q"), py::arg("qdot") = py::none(),
+      py::arg("q"), py::arg("qdot") = py::none(), py::arg("qddot") = py::none(),
       "Starts, or starts again, at q (n,): forgets all history, and pins the posture there unless one was "
       "given.\n\n"
       "qdot: (n,) how the arm moves now, from which the command is faded; None: it stands.\n"
+      "qddot: (n,) its acceleration, which matters to jerk limits. None: joints whose q and qdot are those of the "
+      "last\n"
+      "    step keep the acceleration that the servo knows; of other joints none is assumed.\n"
+      "To tell a running servo where the arm is, call `measure`.\n"
       "Warns (ModelWarning) of a joint that starts more than 1 rad or 1 m outside its limits.");
+}
+
+void bind_measurement(py::class_<Servo>& c) {
+  c.def(
+       "measure",
+       [](Servo& s, const ArrayLike& q, const MaybeArray& qdot) {
+         require_started(s);
+         const int n = s.chain().dof();
+         s.measure(joint_argument(q, "q", n), optional_joint_argument(object_of(qdot), "qdot", n));
+       },
+       py::arg("q"), py::arg("qdot") = py::none(),
+       "Tells the servo where the arm is, before `update`: in each cycle, or as often as the arm is measured.\n\n"
+       "The pose error of `update` is then that of the arm and not that of the reference, through a low-pass filter "
+       "of\n"
+       "0.1 s: the tool arrives although the joints' controllers leave an error, and noise does not enter the "
+       "command.\n"
+       "The command stays continuous and inside all limits, which hold for the reference.\n\n"
+       "q: (n,) measured positions [rad or m].\n"
+       "qdot: (n,) measured velocities, with which the filter does not lag; None: unknown.")
+      .def_property_readonly(
+          "following_error", [](const Servo& s) { return to_numpy(s.following_error()); },
+          "(n,) measured minus commanded position [rad or m], filtered; zero before `measure`.");
 }
 
 void bind_cycle(py::class_<Servo>& c) {
@@ -124,6 +158,9 @@ void bind_state(py::class_<Servo>& c) {
       .def_property_readonly("chain", &Servo::chain)
       .def_property_readonly(
           "dt", [](const Servo& s) { return s.options().dt; }, "[s]")
+      .def_property_readonly("length_scale", &Servo::length_scale, "[m] 1 rad weighs as much as this length.")
+      .def_property_readonly("settling_time", &Servo::settling_time,
+                             "[s], after which a motion towards a target that rests is called not settling.")
       .def_property_readonly("q", once_started([](const Servo& s) { return s.q(); }),
                              "(n,) where the reference stands.")
       .def_property_readonly("pose", once_started([](const Servo& s) { return s.tip().matrix(); }),
@@ -143,9 +180,10 @@ void bind_servo(py::module_& m) {
   py::class_<Servo> c(
       m, "Servo",
       "Drives a chain's reference configuration towards poses, or along twists, one cycle a call.\n\n"
-      "It integrates its own command (q ← q + q̇ dt) and reads no measured positions. Every command holds\n"
+      "It integrates its own command (q ← q + q̇ dt) and needs no measured positions (`measure`). Every command holds\n"
       "the chain's limits and leaves room to go on holding them; a start outside them comes back.");
   bind_setup(c);
+  bind_measurement(c);
   bind_cycle(c);
   bind_state(c);
 }

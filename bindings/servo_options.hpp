@@ -5,6 +5,12 @@
 
 namespace sigmaik::bindings {
 
+// What set-up warns of. Who gives an assumed acceleration needs no warning of the default's.
+inline std::vector<std::string> missing_limits(const Chain& chain, const LimitOptions& options) {
+  const bool assumes = options.assumed_acceleration == LimitOptions{}.assumed_acceleration;
+  return chain.missing_limits(options.velocity, options.acceleration && assumes);
+}
+
 template <>
 struct Fields<LimitOptions> {
   static constexpr std::tuple all{
@@ -13,6 +19,8 @@ struct Fields<LimitOptions> {
       field("velocity_limits", &LimitOptions::velocity, "the same for its velocity limits."),
       field("acceleration_limits", &LimitOptions::acceleration, "the same for its acceleration limits."),
       field("jerk_limits", &LimitOptions::jerk, "the same for its jerk limits."),
+      field("assumed_acceleration", &LimitOptions::assumed_acceleration,
+            "[rad/s² or m/s²] > 0, the acceleration limit of joints whose model has none; inf: they have none."),
       field("recovery_speed", &LimitOptions::recovery_speed,
             "in (0, 1], of the velocity limit: the least speed at which a joint that starts outside its position "
             "limits comes back."),
@@ -70,7 +78,7 @@ struct Fields<ServoOptions> {
             "[1/s] ≥ 0, from position error to velocity. (JParse's gain_linear is another thing: the paper's K.)"),
       field("gain_angular", &ServoOptions::gain_angular, "[1/s] ≥ 0, from orientation error to angular velocity."),
       field("max_linear_error", &ServoOptions::max_linear_error,
-            "[m] > 0: longer position errors are shortened to it."),
+            "[m] > 0: longer position errors are shortened to it. None: half of length_scale."),
       field("max_angular_error", &ServoOptions::max_angular_error,
             "[rad] > 0: longer orientation errors are shortened to it."),
       field("soft_start", &ServoOptions::soft_start,
@@ -81,13 +89,16 @@ struct Fields<ServoOptions> {
       field("posture_max_speed", &ServoOptions::posture_max_speed, "[rad/s or m/s] > 0, cap on each joint's."),
       nested(&ServoOptions::avoid),
       nested(&ServoOptions::limits),
-      field("on_limit", &ServoOptions::on_limit,
-            "what gives way at a limit. 'redistribute': other joints take over, for the nearest twist that limits "
-            "allow; 'scale': the direction is kept, speed is given up."),
+      field(
+          "on_limit", &ServoOptions::on_limit,
+          "what gives way at a position limit. 'redistribute': other joints take over, for the nearest twist that "
+          "limits allow; 'scale': the direction is kept, speed is given up. At a velocity limit the direction is kept; "
+          "'redistribute' first uses the motion that does not move the tool."),
       field("exact", &ServoOptions::exact,
-            "(6,) truth values: the rows (vx, vy, vz, ωx, ωy, ωz) that come before the others when redistributing."),
+            "(6,) truth values: the rows (vx, vy, vz, ωx, ωy, ωz) that come before the others in every cycle."),
       field("length_scale", &ServoOptions::length_scale,
-            "[m] > 0: 1 rad/s weighs as much as length_scale m/s, as for VelocitySolver."),
+            "[m] > 0: 1 rad/s weighs as much as length_scale m/s, as for VelocitySolver. None: "
+            "chain.characteristic_length."),
       nested(&ServoOptions::task),
   };
 };

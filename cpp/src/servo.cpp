@@ -9,10 +9,12 @@
 #include "finite.hpp"
 #include "length.hpp"
 #include "message.hpp"
+#include "numbers.hpp"
 
 namespace sigmaik {
 namespace {
 
+using detail::kInfinity;
 using detail::require;
 
 void check(const char* what, double value, bool zero_allowed, const char* unit) {
@@ -31,6 +33,41 @@ void check_joints(const char* what, const JointRef& values, const Chain& chain) 
     require(std::isfinite(values[i]), what, " of joint '", chain.joint_names()[static_cast<std::size_t>(i)],
             "' is not finite");
   }
+}
+
+// [s] time constant of measure(): a hundred cycles of noise, and several times the lag of a joint's controller.
+constexpr double kMeasuringTime = 0.1;
+
+// With a tenth of a radian of phase per cycle, and with the acceleration and jerk that carry 0.02 rad (or m) to and
+// fro, a loop of this bandwidth does not saturate the limits.
+constexpr double kPhasePerCycle = 0.1;
+constexpr double kAmplitude = 0.02;
+
+Pace pace_of(const LimitTracker& tracker, double length_scale) {
+  Pace pace;
+  pace.slowness.resize(tracker.dof());
+  for (int i = 0; i < tracker.dof(); ++i) pace.slowness[i] = 1.0 / tracker.velocity_limit(i);
+  const double bandwidth = std::min({kPhasePerCycle / tracker.dt(),
+                                     std::sqrt(tracker.least_acceleration() / kAmplitude),
+                                     std::cbrt(tracker.least_jerk() / kAmplitude)});
+  pace.lag = length_scale / bandwidth;
+  return pace;
+}
+
+// See Servo::settling_time().
+double settling_time_of(const LimitTracker& tracker, const JointLimits& limits) {
+  double longest = 0.0;
+  for (int i = 0; i < tracker.dof(); ++i) {
+    constexpr double kTurn = 6.283185307179586;
+    const double range = limits.upper[i] - limits.lower[i];
+    const double way = tracker.options().position && std::isfinite(range) ? range : kTurn;
+    const double most = tracker.velocity_limit(i), a = std::min(limits.acceleration[i], tracker.least_acceleration());
+    // The time of a motion with each limit alone adds up to more than that of a motion with all limits.
+    double time = way / most + 2.0 * std::sqrt(way / a);
+    if (tracker.options().jerk) time += 4.0 * std::cbrt(way / limits.jerk[i]);
+    longest = std::max(longest, time);
+  }
+  return 3.0 + 3.0 * longest;
 }
 
 // The singular directions as twists. The solution gives their columns u_i in the rows of the task.
@@ -52,12 +89,14 @@ Servo::Servo(Chain chain, const Method& method, const ServoOptions& options)
     : chain_(std::move(chain)),
       options_(options),
       exact_{options.exact, options.task.frame},
-      solver_(method, options.length_scale, options.task),
+      rest_(options.task),
+      solver_(method, options.length_scale.value_or(chain_.characteristic_length()), options.task),
       avoidance_(chain_, options.avoid),
-      tracker_(chain_.limits(), options.dt, options.limits) {
+      tracker_(chain_.limits(), options.dt, options.limits),
+      max_linear_error_(options.max_linear_error.value_or(0.5 * solver_.length_scale())) {
   check_finite("gain_linear", options.gain_linear, true, "1/s");
   check_finite("gain_angular", options.gain_angular, true, "1/s");
-  check("max_linear_error", options.max_linear_error, false, "m");
+  check("max_linear_error", max_linear_error_, false, "m");
   check("max_angular_error", options.max_angular_error, false, "rad");
   check_finite("soft_start", options.soft_start, true, "s");
   check_finite("posture_gain", options.posture_gain, true, "1/s");
@@ -65,13 +104,18 @@ Servo::Servo(Chain chain, const Method& method, const ServoOptions& options)
   if (options.posture.size() != 0) check_joints("posture", options.posture, chain_);
   for (std::size_t i = 0; i < 6; ++i) {
     require(!options.exact[i] || options.task.mask[i], "exact asks for row ", i, ", which the task's mask leaves out");
+    rest_.mask[i] = options.task.mask[i] && !options.exact[i];
   }
+  solver_.set_pace(pace_of(tracker_, solver_.length_scale()));
+  settling_time_ = settling_time_of(tracker_, chain_.limits());
+  following_error_ = JointVector::Zero(chain_.dof());
 }
 
-void Servo::reset(const JointRef& q, const JointRef& qdot) {
+void Servo::reset(const JointRef& q, const JointRef& qdot, const JointRef& qddot) {
   check_joints("q", q, chain_);
   if (qdot.size() != 0) check_joints("qdot", qdot, chain_);
-  tracker_.reset(q, qdot);
+  if (qddot.size() != 0) check_joints("qddot", qddot, chain_);
+  tracker_.reset(q, qdot, qddot);
   qdot_start_ = qdot.size() != 0 ? JointVector(qdot) : JointVector(JointVector::Zero(chain_.dof()));
   begin(q);
 }
@@ -85,9 +129,31 @@ void Servo::begin(const JointRef& posture) noexcept {
   }
   solver_.reset();
   least_squares_.reset();
-  exact_spectrum_ = Spectrum{};
+  slowing_.reset();
+  exact_spectrum_ = rest_spectrum_ = Spectrum{};
   sigmaik::update(chain_, tracker_.q(), state_);
-  fade_ = 0.0;
+  fade_ = rested_ = 0.0;
+  reversals_ = 0;
+  last_way_ = JointVector::Zero(chain_.dof());
+  following_error_.setZero();
+  measured_ = false;
+}
+
+bool Servo::measure(const JointRef& q, const JointRef& qdot) noexcept {
+  const int n = chain_.dof();
+  if (tracker_.q().size() == 0 || q.size() != n || (qdot.size() != 0 && qdot.size() != n)) return false;
+  if (!detail::finite(JointVector(q)) || !detail::finite(JointVector(qdot))) return false;
+  if (!measured_) {
+    following_error_ = q - tracker_.q();
+  } else {
+    if (qdot.size() != 0) following_error_ += options_.dt * (qdot - tracker_.qdot());
+    following_error_ += std::min(1.0, options_.dt / kMeasuringTime) * (q - tracker_.q() - following_error_);
+  }
+  measured_ = true;
+  ChainState state;
+  sigmaik::update(chain_, tracker_.q() + following_error_, state);
+  measured_tip_ = state.tip;
+  return true;
 }
 
 void Servo::continue_from(const Servo& other) {
@@ -104,6 +170,7 @@ JointVector Servo::posture_velocity() const noexcept {
   if (options_.posture_gain != 0.0) {
     const double cap = options_.posture_max_speed;
     velocity = (options_.posture_gain * (nominal_ - tracker_.q())).cwiseMax(-cap).cwiseMin(cap);
+    velocity *= tracker_.arrival(velocity, options_.posture_gain);
   }
   if (!avoidance_.active()) return velocity;
   const JointVector away = avoidance_.velocity(tracker_.q());
@@ -121,28 +188,53 @@ ServoStep Servo::stop(Status status) noexcept {
 
 ServoStep Servo::update(const Pose& target, const Twist& feedforward) noexcept {
   if (!is_pose(target.matrix()) || !detail::finite(feedforward)) return stop(Status::BadInput);
-  const Twist error = pose_error(state_.tip, target);
+  const Twist error = pose_error(measured_ ? measured_tip_ : state_.tip, target);
   Twist twist = error;
-  detail::shorten(twist.head<3>(), options_.max_linear_error);
+  detail::shorten(twist.head<3>(), max_linear_error_);
   detail::shorten(twist.tail<3>(), options_.max_angular_error);
   twist.head<3>() *= options_.gain_linear;
   twist.tail<3>() *= options_.gain_angular;
   twist += feedforward;
-  ServoStep step = resolve(twist, true);
+  ServoStep step = resolve(twist, &feedforward, true);
   step.pose_error = error;
+  watch(target, step);
   return step;
+}
+
+// Whether the arm still moves after the target has rested for longer than any motion takes.
+void Servo::watch(const Pose& target, ServoStep& step) noexcept {
+  if (target.matrix() != last_target_.matrix()) {
+    last_target_ = target;
+    rested_ = 0.0;
+    reversals_ = 0;
+    last_way_.setZero();
+    return;
+  }
+  // Without limits that delay the command, a motion that does not settle is the rule's own.
+  if (!(tracker_.least_acceleration() < kInfinity) && !tracker_.has_jerk()) return;
+  count_reversals(step.qdot);
+  rested_ += options_.dt;
+  if (rested_ < settling_time_) return;
+  for (int i = 0; i < chain_.dof(); ++i) {
+    const double limit = tracker_.velocity_limit(i);
+    if (std::abs(step.qdot[i]) > 1e-3 * (limit < kInfinity ? limit : 1.0)) step.not_settling = true;
+  }
 }
 
 ServoStep Servo::update_twist(const Twist& twist) noexcept {
   if (!detail::finite(twist)) return stop(Status::BadInput);
-  return resolve(twist, qdot_start_.size() != 0 && !qdot_start_.isZero(0.0));
+  rested_ = 0.0;
+  return resolve(twist, nullptr, qdot_start_.size() != 0 && !qdot_start_.isZero(0.0));
 }
 
-ServoStep Servo::resolve(const Twist& twist, bool fade) noexcept {
+// `feedforward`: null for a twist command, which has nowhere to arrive.
+ServoStep Servo::resolve(const Twist& twist, const Twist* feedforward, bool fade) noexcept {
   if (tracker_.q().size() == 0) return stop(Status::BadInput);
   const Eigen::Matrix3d& rotation = state_.tip.linear();
-  const Solution solution = solver_.solve(state_.jacobian, twist, posture_velocity(), rotation);
+  const JointVector posture = posture_velocity();
+  Solution solution = solver_.solve(state_.jacobian, twist, posture, rotation);
   if (solution.status == Status::BadInput) return stop(Status::BadInput);
+  if (has_exact()) prioritize(twist, posture, solution);
 
   ServoStep step;
   step.asked_twist = twist;
@@ -151,13 +243,14 @@ ServoStep Servo::resolve(const Twist& twist, bool fade) noexcept {
   step.singular = solution.singular;
   step.task_rows = static_cast<int>(solution.directions.cols());
   if (solution.singular != 0) {
-    step.singular_directions = singular_twists(solution, options_.task, rotation, options_.length_scale);
+    step.singular_directions = singular_twists(solution, options_.task, rotation, solver_.length_scale());
   }
   step.qdot = solution.qdot;
   step.achieved_twist = solution.achieved_twist;
 
-  bool rule = !fade_in(step.qdot, fade);  // the rule's answer stands
-  if (!tracker_.bounds().contain(step.qdot)) {
+  bool rule = feedforward == nullptr || !arrive(*feedforward, step.qdot);  // the rule's answer stands
+  if (fade_in(step.qdot, fade)) rule = false;
+  if (tracker_.has_jerk() || !tracker_.bounds().contain(step.qdot)) {
     limit(step);
     rule = false;
   }

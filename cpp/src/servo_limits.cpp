@@ -62,15 +62,28 @@ JointVector furthest(const JointVector& from, const JointVector& to, const Veloc
 
 void Servo::limit(ServoStep& step) noexcept {
   const JointVector asked = step.qdot;
+  slow_down(step);
   head(step);
   approach(step);
   judge(asked, step);
 }
 
-// Position and velocity limits: the command becomes a velocity inside the heading bounds.
+// Position limits: the command becomes a velocity inside the heading bounds, and inside the velocity limits still.
 void Servo::head(ServoStep& step) noexcept {
-  const VelocityBounds heading = tracker_.heading();
+  VelocityBounds heading = tracker_.heading();
   if (heading.contain(step.qdot)) return;
+  for (int i = 0; i < chain_.dof(); ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    const double limit = tracker_.velocity_limit(i);
+    if (heading.upper[i] > limit) {
+      heading.upper[i] = std::max(limit, heading.lower[i]);
+      heading.upper_kind[at] = LimitKind::Velocity;
+    }
+    if (heading.lower[i] < -limit) {
+      heading.lower[i] = std::min(-limit, heading.upper[i]);
+      heading.lower_kind[at] = LimitKind::Velocity;
+    }
+  }
   if (options_.on_limit == OnLimit::Redistribute) {
     step.qdot = redistribute(step.qdot, heading, step);
   } else {
@@ -82,6 +95,17 @@ void Servo::head(ServoStep& step) noexcept {
 // Acceleration and jerk limits: the command becomes the part of the way to the heading that fits into this cycle.
 void Servo::approach(ServoStep& step) noexcept {
   const VelocityBounds& bounds = tracker_.bounds();
+  if (tracker_.has_jerk()) {
+    const JointVector wanted = step.qdot;
+    step.qdot = tracker_.approach(wanted);
+    for (int i = 0; i < chain_.dof(); ++i) {
+      if (step.qdot[i] != wanted[i] || !(wanted[i] >= bounds.lower[i] && wanted[i] <= bounds.upper[i])) {
+        step.limiting_joints |= static_cast<std::uint16_t>(1u << i);
+      }
+    }
+    step.qdot = step.qdot.cwiseMax(bounds.lower).cwiseMin(bounds.upper);
+    return;
+  }
   if (bounds.contain(step.qdot)) return;
   step.qdot = furthest(tracker_.qdot(), step.qdot, bounds, step.limiting_joints);
   if (options_.on_limit == OnLimit::Redistribute && !bounds.contain(step.qdot)) {

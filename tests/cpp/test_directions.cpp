@@ -8,6 +8,7 @@
 
 #include "oracles.hpp"
 #include "random.hpp"
+#include "twin.hpp"
 
 using namespace sigmaik;
 
@@ -63,14 +64,13 @@ TEST_CASE("a cycle's singular directions are the rule's, for every method, task 
     const Eigen::Matrix3d rotation = state.tip.linear();
     const Twist twist = random.vector(6);
     const ServoStep step = servo.update_twist(twist);
-    const Solution solution = VelocitySolver(method, options.length_scale, options.task)
-                                  .solve(state.jacobian, twist, JointVector(), rotation);
+    const Solution solution = test::rule_of(servo).solve(state.jacobian, twist, JointVector(), rotation);
     CAPTURE(k);
     CHECK(step.singular == solution.singular);
     REQUIRE(step.singular_directions.cols() == solution.singular_count());
 
     // In the rows of the task the directions are the solver's u_i; in the other rows they are zero.
-    const Eigen::MatrixXd rows = task_rows(options.task, options.length_scale, rotation);
+    const Eigen::MatrixXd rows = task_rows(options.task, servo.length_scale(), rotation);
     Task others = options.task;
     for (bool& row : others.mask) row = !row;
     const Eigen::MatrixXd directions = step.singular_directions, u = rows * directions;

@@ -120,6 +120,7 @@ TEST_CASE("servos and constrained inverse kinematics with limits active pass Eig
           const NoMalloc none;
           for (int cycle = 0; cycle < 100; ++cycle) {
             sum += servo.update(target).qdot.sum() + servo.update_twist(twist).qdot.sum();
+            if (cycle > 50) sum += servo.measure(moving, zero) + servo.update(target, twist).qdot.sum();
             if (cycle % 30 == 29) sum += servo.update(wrong).qdot.sum();
           }
         }

@@ -19,6 +19,7 @@
 #include "numbers.hpp"
 #include "oracles.hpp"
 #include "random.hpp"
+#include "twin.hpp"
 
 namespace {
 
@@ -85,102 +86,242 @@ ServoStep once(const Chain& chain, const Method& method, const ServoOptions& opt
   return servo.update_twist(twist);
 }
 
-VectorXd rule(const Chain& chain, const Method& method, const JointVector& q, const Twist& twist) {
-  VelocitySolver solver(method);
+// The answer of a servo's rule alone.
+VectorXd rule(const Chain& chain, const Method& method, const ServoOptions& options, const JointVector& q,
+              const Twist& twist) {
+  VelocitySolver solver = test::rule_of(Servo(chain, method, options));
   return solver.solve(jacobian(chain, q), twist).qdot;
+}
+
+// The Jacobian whose angular rows have the unit of the linear rows.
+MatrixXd weighted(const Chain& chain, const JointVector& q, double length_scale) {
+  MatrixXd J = jacobian(chain, q);
+  J.bottomRows(3) *= length_scale;
+  return J;
+}
+
+// Position limits of joint i around q, so close that without an acceleration limit the joint may have velocities from
+// −speed to speed for one cycle.
+void close_in(double speed, double dt, const JointVector& q, Eigen::Index i, JointLimits& limits) {
+  limits.lower[i] = q[i] - speed * dt;
+  limits.upper[i] = q[i] + speed * dt;
 }
 
 }  // namespace
 
 TEST_CASE("while no limit is met the answer is the rule's, to the last digit") {
-  long same = 0, other = 0;
-  for (const auto& [key, shipped] : arms()) {
-    const std::string& name = key;
-    const Chain chain = complete(shipped, 500.0);
-    for (const Method& method : test::library_methods()) {
-      for (const OnLimit on_limit : {OnLimit::Redistribute, OnLimit::Scale}) {
-        CAPTURE(name);
-        Random random(1);
-        ServoOptions options;
-        options.on_limit = on_limit;
-        options.exact = {true, true, true, false, false, false};
-        Servo servo(chain, method, options);
-        VelocitySolver solver(method);
-        servo.reset(regular(random, chain, 0.05));
-        const Twist twist = 0.1 * random.unit(6);
-        for (int cycle = 0; cycle < 400; ++cycle) {
-          const Twist now = twist * std::min(1.0, 2e-5 * cycle * cycle);
-          const VectorXd asked = solver.solve(jacobian(chain, servo.q()), now).qdot;
-          const ServoStep step = servo.update_twist(now);
-          if (step.limiting_joints != 0) {
-            ++other;
-            continue;
+  for (const double jerk : {kInfinity, 500.0}) {
+    long same = 0, other = 0;
+    for (const auto& [key, shipped] : arms()) {
+      const std::string& name = key;
+      const Chain chain = complete(shipped, jerk);
+      for (const Method& method : test::library_methods()) {
+        for (const OnLimit on_limit : {OnLimit::Redistribute, OnLimit::Scale}) {
+          CAPTURE(name);
+          CAPTURE(jerk);
+          Random random(1);
+          ServoOptions options;
+          options.on_limit = on_limit;
+          Servo servo(chain, method, options);
+          VelocitySolver solver = test::rule_of(servo);
+          servo.reset(regular(random, chain, 0.05));
+          const Twist twist = 0.1 * random.unit(6);
+          for (int cycle = 0; cycle < 400; ++cycle) {
+            const Twist now = twist * std::min(1.0, 2e-5 * cycle * cycle);
+            const VectorXd asked = solver.solve(jacobian(chain, servo.q()), now).qdot;
+            const ServoStep step = servo.update_twist(now);
+            if (step.limiting_joints != 0) {
+              ++other;
+              continue;
+            }
+            ++same;
+            CHECK(VectorXd(step.qdot) == asked);
+            CHECK(step.scale == 1.0);
+            CHECK(step.status <= Status::Damped);
           }
-          ++same;
-          CHECK(VectorXd(step.qdot) == asked);
-          CHECK(step.scale == 1.0);
-          CHECK(step.status <= Status::Damped);
         }
       }
     }
+    CAPTURE(jerk);
+    CAPTURE(other);
+    // With jerk limits the command is the rule's once the velocity has been reached.
+    CHECK(same > (std::isinf(jerk) ? 57000 : 30000));
   }
-  CAPTURE(other);
-  CHECK(same > 40000);
 }
 
 TEST_CASE("redistribution solves the bounded least squares of its description") {
   Random random(2);
-  int cases = 0, several = 0;
+  int cases = 0, several = 0, damped = 0;
   for (const auto& [key, shipped] : arms()) {
     const std::string& name = key;
     for (int repeat = 0; repeat < 60; ++repeat) {
       CAPTURE(name);
       CAPTURE(repeat);
       const int n = shipped.dof();
-      const JointVector q = regular(random, shipped, 0.11);
-      const MatrixXd J = jacobian(shipped, q);
+      const ServoOptions options = holding(true, false, false, false);
+      const bool singular = repeat % 2 == 0;  // there the weights are the rule's thresholds
+      const JointVector q = singular ? inside(random, shipped) : regular(random, shipped, 0.11);
       const Twist twist = 0.5 * random.unit(6);
-      const VectorXd asked = rule(shipped, JParse{}, q, twist);
+      const Servo servo(shipped, JParse{}, options);
+      VelocitySolver solver = test::rule_of(servo);
+      const VectorXd asked = solver.solve(jacobian(shipped, q), twist).qdot;
       JointLimits limits = shipped.limits();
+      VectorXd fastest(n);
       for (int i = 0; i < n; ++i) {
-        limits.velocity[i] = random.chance(0.5) ? kInfinity : std::abs(asked[i]) * random.uniform(0.1, 1.5) + 1e-6;
+        const bool far = random.chance(0.5) ||
+                         shipped.joint_types()[static_cast<std::size_t>(i)] == JointType::Continuous;
+        fastest[i] = far ? 1e3 : std::abs(asked[i]) * random.uniform(0.1, 1.5) + 1e-6;
+        if (shipped.joint_types()[static_cast<std::size_t>(i)] != JointType::Continuous) {
+          close_in(fastest[i], options.dt, q, i, limits);
+        }
       }
-      if (((asked.cwiseAbs() - limits.velocity).array() <= 0.0).all()) continue;
+      if (((asked.cwiseAbs() - fastest).array() <= 0.0).all()) continue;
       const Chain chain = shipped.with_limits(limits);
-      const ServoStep step = once(chain, JParse{}, holding(false, true, false, false), q, twist);
+      const ServoStep step = once(chain, JParse{}, options, q, twist);
       const VectorXd qdot = step.qdot, x = qdot - asked;
       ++cases;
 
-      // min |J x|² + λ² |x|², λ = σ_max/100, and once more from the answer: as a stacked problem.
-      const VectorXd sigma = test::singular_values(J);
-      const double largest = sigma[0], lambda = 1e-2 * largest;
+      // With S = Σ w_i u_i v_iᵀ, w_i the rule's weights, first min |S (q̇ − q̇_rule)|² + λ² |q̇ − q̇_rule|², λ = σ_max/100.
+      // Then once more about this answer, and with the weight lag·|S (q̇ − q̇_rule)|, of this answer, on q̇ itself.
+      const Spectrum& spectrum = solver.spectrum();
+      const double largest = spectrum.sigma(0), lambda = 1e-2 * largest;
+      MatrixXd S(spectrum.size(), n);
+      for (int i = 0; i < spectrum.size(); ++i) {
+        S.row(i) = solver.resolution().weight[static_cast<std::size_t>(i)] * spectrum.v(i).transpose();
+      }
+      const MatrixXd J = weighted(shipped, q, servo.length_scale());
+      if (!singular) CHECK((S.transpose() * S - J.transpose() * J).norm() < 1e-9 * largest * largest);
       LeastSquaresProblem problem;
-      problem.A = (MatrixXd(6 + n, n) << J, lambda * MatrixXd::Identity(n, n)).finished();
-      problem.b = VectorXd::Zero(6 + n);
-      problem.lower = -limits.velocity - asked;
-      problem.upper = limits.velocity - asked;
+      const auto m = S.rows();
+      problem.A = (MatrixXd(m + n, n) << S, lambda * MatrixXd::Identity(n, n)).finished();
+      problem.b = VectorXd::Zero(m + n);
+      problem.lower = -fastest - asked;
+      problem.upper = fastest - asked;
       LeastSquares oracle;
-      problem.b.tail(n) = lambda * oracle.solve(problem).x;
+      const VectorXd first = asked + oracle.solve(problem).x;
+      const double motion = servo.pace().lag * (S * (first - asked)).norm();
+      problem.A = MatrixXd(m + 2 * n, n);
+      problem.A << S, lambda * MatrixXd::Identity(n, n), std::sqrt(motion) * MatrixXd::Identity(n, n);
+      problem.b = VectorXd(m + 2 * n);
+      problem.b << VectorXd::Zero(m), lambda * (first - asked), -std::sqrt(motion) * asked;
       const LeastSquaresSolution best = oracle.solve(problem);
-      CHECK((x - best.x).norm() <= 1e-9 * (1.0 + x.norm()));
+      CHECK((x - best.x).norm() <= 1e-8 * (1.0 + x.norm()));
       int held = 0;
       for (int i = 0; i < n; ++i) {
-        CHECK(std::abs(qdot[i]) <= limits.velocity[i]);
-        const bool on = std::abs(qdot[i]) >= limits.velocity[i] * (1.0 - 1e-14);
+        CHECK(step.q[i] <= limits.upper[i]);
+        CHECK(step.q[i] >= limits.lower[i]);
+        const bool on = std::abs(qdot[i]) >= fastest[i] * (1.0 - 1e-9);
         held += on;
         if ((step.limiting_joints >> i & 1) != 0) CHECK(on);
       }
       CHECK(step.limiting_joints != 0);
       several += held > 1;
+      damped += step.singular != 0;
 
       // So the tool is no farther off than with each joint of the rule's answer cut off at its limit.
-      const VectorXd cut = asked.cwiseMax(-limits.velocity).cwiseMin(limits.velocity);
-      CHECK((J * x).norm() <= (J * (cut - asked)).norm() + lambda * (cut - asked).norm());
+      const VectorXd cut = asked.cwiseMax(-fastest).cwiseMin(fastest);
+      CHECK((S * x).norm() <=
+            (S * (cut - asked)).norm() + lambda * (cut - asked).norm() + std::sqrt(motion) * cut.norm());
       CHECK((step.status == Status::Limited) == ((J * x).norm() > 1e-4 * (J * asked).norm()));
     }
   }
   CHECK(cases > 300);
   CHECK(several > 100);
+  CHECK(damped > 20);
+}
+
+TEST_CASE("a velocity limit keeps the direction of the twist, and as much of its speed as the joints can do") {
+  Random random(13);
+  int cases = 0, helped = 0, whole = 0;
+  double given_up = 0.0;
+  for (const auto& [key, shipped] : arms()) {
+    const std::string& name = key;
+    const int n = shipped.dof();
+    for (int repeat = 0; repeat < 60; ++repeat) {
+      for (const OnLimit on_limit : {OnLimit::Redistribute, OnLimit::Scale}) {
+        CAPTURE(name);
+        CAPTURE(repeat);
+        CAPTURE(static_cast<int>(on_limit));
+        ServoOptions options = holding(false, true, false, false);
+        options.on_limit = on_limit;
+        const JointVector q = repeat % 3 == 0 ? inside(random, shipped) : regular(random, shipped, 0.11);
+        const Twist twist = 0.5 * random.unit(6);
+        const VectorXd rough = rule(shipped, JParse{}, options, q, twist);
+        JointLimits limits = shipped.limits();
+        for (int i = 0; i < n; ++i) {
+          const bool fast = random.chance(0.5);
+          limits.velocity[i] = fast ? 3.0 * rough.cwiseAbs().maxCoeff()
+                                    : std::abs(rough[i]) * random.uniform(0.1, 1.5) + 1e-3;
+        }
+        const Chain chain = shipped.with_limits(limits);
+        Servo servo(chain, JParse{}, options);
+        servo.reset(q);
+        VelocitySolver solver = test::rule_of(servo);  // the threshold depends on the velocity limits
+        const MatrixXd J = weighted(chain, q, servo.length_scale());
+        const VectorXd asked = solver.solve(jacobian(chain, q), twist).qdot;
+        const double fits = 1.0 / std::max(1.0, (asked.cwiseAbs().cwiseQuotient(limits.velocity)).maxCoeff());
+        const VectorXd qdot = servo.update_twist(twist).qdot;
+        if (fits == 1.0) {
+          CHECK(qdot == asked);
+          continue;
+        }
+        ++cases;
+        const VectorXd goal = J * asked, done = J * qdot;
+        const double s = done.dot(goal) / goal.squaredNorm();
+        CHECK((done - s * goal).norm() <= 1e-9 * goal.norm());
+        CHECK((qdot.cwiseAbs() - limits.velocity).maxCoeff() <= 0.0);
+        CHECK(s <= 1.0 + 1e-9);
+        CHECK(s >= fits * (1.0 - 1e-9));
+        if (on_limit == OnLimit::Scale || n <= 6) {
+          CHECK((qdot - fits * asked).norm() <= 1e-9 * asked.norm());
+          continue;
+        }
+        // One free direction: q̇ = s q̇_rule + y n is inside for y in an interval; the largest s has an interval left.
+        const VectorXd null = test::svd(J).v.col(6);
+        const auto interval = [&](double part) {
+          double low = -kInfinity, high = kInfinity;
+          for (int i = 0; i < n; ++i) {
+            const double v = part * asked[i], limit = limits.velocity[i];
+            if (std::abs(null[i]) < 1e-9) {
+              if (std::abs(v) > limit * (1.0 + 1e-9)) return std::pair{1.0, -1.0};
+              continue;
+            }
+            const double a = (-limit - v) / null[i], b = (limit - v) / null[i];
+            low = std::max(low, std::min(a, b));
+            high = std::min(high, std::max(a, b));
+          }
+          return std::pair{low, high};
+        };
+        double low = fits, high = 1.0;
+        if (const auto [a, b] = interval(1.0); a <= b) low = 1.0;
+        for (int k = 0; k < 60 && low < 1.0; ++k) {
+          const double middle = 0.5 * (low + high);
+          const auto [a, b] = interval(middle);
+          (a <= b ? low : high) = middle;
+        }
+        // The motion that leaves the tool as it is has a price of 1e-6: with y(s) the least of it, the answer minimises
+        // (1 − s)² + 1e-6 (|q̇ − q̇_rule|/max|q̇_rule|)², whose slope vanishes where 1 − s = 1e-6 y y'/max|q̇_rule|².
+        const auto least = [&](double part) {
+          const auto [a, b] = interval(part);
+          return std::max({0.0, a, -b});
+        };
+        const double slope = (least(low) - least(low - 1e-4)) / 1e-4, fastest = asked.cwiseAbs().maxCoeff();
+        const double price = 1e-6 * least(low) * slope / (fastest * fastest);
+        given_up = std::max(given_up, std::min(low, 1.0) - s);
+        CHECK(s >= std::min(low, 1.0 - 1.1 * price) - 1e-7);
+        helped += s > fits + 1e-3;
+        whole += s > 1.0 - 1e-5;
+        // Of these velocities it is the nearest to the rule's.
+        const auto [a, b] = interval(s);
+        const double free = std::clamp(0.0, std::min(a, b), std::max(a, b));
+        CHECK((qdot - s * asked - free * null).norm() <= 1e-5 * (1.0 + asked.norm()));
+      }
+    }
+  }
+  MESSAGE("part of the speed that redundant arms give up rather than move faster: ≤ ", given_up);
+  CHECK(cases > 500);
+  CHECK(helped > 100);
+  CHECK(whole > 20);
 }
 
 TEST_CASE("redundant arms: the other joints take over the whole twist where they can") {
@@ -195,7 +336,7 @@ TEST_CASE("redundant arms: the other joints take over the whole twist where they
       const VectorXd null = test::svd(J).v.col(6);
       const Twist twist = 0.3 * random.unit(6);
       const JParse method{0.05};
-      const VectorXd asked = rule(shipped, method, q, twist);
+      const VectorXd asked = rule(shipped, method, holding(true, false, false, false), q, twist);
       for (int i = 0; i < 7; ++i) {
         if (std::abs(null[i]) < 0.5) continue;
         for (const bool blocked : {false, true}) {
@@ -216,8 +357,9 @@ TEST_CASE("redundant arms: the other joints take over the whole twist where they
           ++cases;
           const double missed = (step.achieved_twist - twist).norm() / twist.norm();
           CHECK(missed <= 1e-3);
-          CHECK((step.status == Status::Ok) == (missed <= 1e-4));
           took_over += missed <= 1e-4;
+          if (missed <= 5e-5) CHECK(step.status == Status::Ok);
+          if (missed > 3e-4) CHECK(step.status == Status::Limited);
           CHECK(step.limiting_joints == 1u << i);
           if (blocked) CHECK(step.q[i] == q[i]);
         }
@@ -228,7 +370,7 @@ TEST_CASE("redundant arms: the other joints take over the whole twist where they
   CHECK(took_over > 0.95 * cases);
 }
 
-TEST_CASE("exact rows are kept while the others give way, in base and in tool axes") {
+TEST_CASE("exact rows are kept at position limits while the others give way, in base and in tool axes") {
   Random random(4);
   int cases = 0, gave_way = 0, first_lost = 0;
   for (const auto& [key, shipped] : arms()) {
@@ -240,27 +382,31 @@ TEST_CASE("exact rows are kept while the others give way, in base and in tool ax
       const JointVector q = regular(random, shipped, 0.11);
       ChainState state;
       update(shipped, q, state);
-      ServoOptions options = holding(false, true, false, false);
+      ServoOptions options = holding(true, false, false, false);
       options.task.frame = repeat % 2 == 0 ? Frame::Base : Frame::Tool;
       Task first{{true, true, true, false, false, false}, options.task.frame};
       if (repeat % 3 == 2) first.mask = {false, false, true, true, true, false};  // height and tilt
       options.exact = first.mask;
       const Twist twist = 0.5 * random.unit(6);
-      const VectorXd asked = rule(shipped, JParse{}, q, twist);
+      const VectorXd asked = rule(shipped, JParse{}, options, q, twist);
       const int i = random.integer(0, n - 1);
+      if (shipped.joint_types()[static_cast<std::size_t>(i)] == JointType::Continuous) continue;
       // Whether the other joints can do the first rows alone.
       MatrixXd rest = select_rows(first, state.tip.linear(), state.jacobian);
       rest.col(i).setZero();
       if (ratio(rest) < 0.15) continue;
       JointLimits limits = shipped.limits();
-      limits.velocity.setConstant(kInfinity);
-      limits.velocity[i] = 0.3 * std::abs(asked[i]);
+      for (int k = 0; k < n; ++k) {
+        if (shipped.joint_types()[static_cast<std::size_t>(k)] == JointType::Continuous) continue;
+        close_in(k == i ? 0.3 * std::abs(asked[i]) : 1e3, options.dt, q, k, limits);
+      }
       const ServoStep step = once(shipped.with_limits(limits), JParse{}, options, q, twist);
       const Twist missed = twist - step.achieved_twist;
       ++cases;
-      // The first rows weigh 10³ times as much, so they miss 10⁻⁶ of the motion of the other rows, times their pull.
+      // The first rows weigh 10³ times as much, so they miss 10⁻⁶ of the motion of the other rows, times their pull,
+      // and what the weight of joint motion leaves of them.
       const double pull = (twist.norm() + missed.norm()) / ratio(rest);
-      CHECK(select_rows(first, state.tip.linear(), missed).norm() <= 1e-5 * pull);
+      CHECK(select_rows(first, state.tip.linear(), missed).norm() <= 5e-5 * pull);
       if (missed.norm() > 1e-3 * twist.norm()) {
         ++gave_way;
         CHECK(step.status == Status::Limited);
@@ -272,24 +418,60 @@ TEST_CASE("exact rows are kept while the others give way, in base and in tool ax
       }
     }
   }
-  CHECK(cases > 250);
+  CHECK(cases > 150);
   CHECK(gave_way > 100);
   CHECK(first_lost > 50);
+}
+
+TEST_CASE("exact rows are a priority without limits too: near singularities they are done, and the others give way") {
+  Random random(14);
+  int cases = 0, gave_way = 0, even_lost = 0;
+  for (const auto& [key, shipped] : arms()) {
+    const std::string& name = key;
+    for (int repeat = 0; repeat < 80; ++repeat) {
+      CAPTURE(name);
+      CAPTURE(repeat);
+      ServoOptions options = holding(false, false, false, false);
+      options.exact = {true, true, true, false, false, false};
+      const JointVector q = inside(random, shipped);
+      const Servo servo(shipped, JParse{}, options);
+      MatrixXd J = weighted(shipped, q, servo.length_scale());
+      // The position rows alone are regular by J-PARSE's threshold, all rows together are not.
+      const VectorXd all = test::singular_values(J), three = test::singular_values(MatrixXd(J.topRows(3)));
+      if (three[2] < 0.11 * all[0] || all[5] > 0.03 * all[0]) continue;
+      ++cases;
+      const Twist twist = 3.0 * random.unit(6);
+      const ServoStep step = once(shipped, JParse{}, options, q, twist);
+      const Twist missed = twist - step.achieved_twist;
+      CHECK(missed.head<3>().norm() <= 1e-9 * twist.norm());
+      if (missed.tail<3>().norm() > 1e-3) {
+        ++gave_way;
+        CHECK(step.status == Status::Damped);
+      }
+      options.exact.fill(false);
+      const ServoStep even = once(shipped, JParse{}, options, q, twist);
+      even_lost += (twist - even.achieved_twist).head<3>().norm() > 1e-3;
+    }
+  }
+  CHECK(cases > 30);
+  CHECK(gave_way > 25);
+  CHECK(even_lost > 30);
 }
 
 TEST_CASE("scaling keeps the direction, and changes velocities in proportion, whenever the limits allow") {
   long straight = 0, bent = 0;
   for (const auto& [key, shipped] : arms()) {
     const std::string& name = key;
-    for (const bool accelerations : {false, true}) {
+    for (const double jerk : {0.0, kInfinity, 200.0}) {
+      const bool accelerations = jerk > 0.0;
       Random random(5);
       CAPTURE(name);
-      CAPTURE(accelerations);
-      const Chain chain = complete(shipped, 200.0);
+      CAPTURE(jerk);
+      const Chain chain = complete(shipped, accelerations ? jerk : kInfinity);
       ServoOptions options = holding(true, true, accelerations, accelerations);
       options.on_limit = OnLimit::Scale;
       Servo servo(chain, JParse{}, options);
-      VelocitySolver solver(JParse{});
+      VelocitySolver solver = test::rule_of(servo);
       LimitTracker tracker(chain.limits(), 1e-3, {.acceleration = accelerations, .jerk = accelerations});
       const JointVector start = inside(random, chain);
       servo.reset(start);
@@ -313,16 +495,27 @@ TEST_CASE("scaling keeps the direction, and changes velocities in proportion, wh
         if (random.chance(0.01)) twist = random.decades(-2.0, 0.5) * random.unit(6);
         const VectorXd asked = solver.solve(jacobian(chain, servo.q()), twist).qdot;
         const VectorXd last = tracker.qdot(), zero = VectorXd::Zero(chain.dof());
-        const double speed = largest(zero, asked, tracker.heading());
+        // Velocity limits slow the motion down first, and then position limits.
+        const double fits = 1.0 / std::max(1.0, asked.cwiseAbs().cwiseQuotient(chain.limits().velocity).maxCoeff());
+        const double speed = fits * largest(zero, fits * asked, tracker.heading());
         const VectorXd goal = std::max(0.0, speed) * asked;
         VectorXd way = goal - last;
         for (double& x : way) x = std::abs(x) > 1e-12 ? x : 0.0;  // smaller entries are rounding
         const double part = largest(last, way, tracker.bounds());
+        const JointVector along = tracker.approach(goal);
+        const bool allowed = tracker.bounds().contain(along);
         const ServoStep step = servo.update_twist(twist);
         JointVector qdot = step.qdot;
         tracker.advance(qdot);
         REQUIRE(qdot == step.qdot);
-        if (speed >= 0.0 && part >= 0.0) {
+        if (tracker.has_jerk()) {  // test_approach.cpp: in proportion, and to no acceleration
+          if (speed >= 0.0 && allowed) {
+            ++straight;
+            CHECK((step.qdot - along).norm() <= 1e-9 * (asked.norm() + last.norm()));
+          } else {
+            ++bent;
+          }
+        } else if (speed >= 0.0 && part >= 0.0) {
           ++straight;
           CHECK((step.qdot - last - part * way).norm() <= 1e-9 * (asked.norm() + last.norm()));
           if (!accelerations) CHECK((step.qdot - speed * asked).norm() <= 1e-9 * asked.norm());
@@ -393,7 +586,7 @@ TEST_CASE("leaving a limit is never held back, from any corner of the limits") {
       const Jacobian J = jacobian(chain, q);
       const Twist twist = J * inward;
       const ServoStep step = once(chain, JParse{}, holding(true, true, false, false), q, twist);
-      const Twist asked = J * rule(chain, JParse{}, q, twist);
+      const Twist asked = J * rule(chain, JParse{}, holding(true, true, false, false), q, twist);
       CHECK(step.qdot.norm() > 1e-6);
       CHECK(step.achieved_twist.dot(asked) > 0.0);
       if (ratio(J) > 0.1) {  // the way inside is among all velocities that can be chosen
@@ -594,17 +787,30 @@ TEST_CASE("no jumps where the set of held joints changes, as commands move and a
       CAPTURE(repeat);
       JointLimits limits = shipped.limits();
       for (double& v : limits.velocity) v = random.decades(-1.5, 0.5);
-      const Chain chain = shipped.with_limits(limits);
-      ServoOptions options = holding(false, true, false, false);
+      // Velocity limits alone, or position limits all around the arm, too.
+      const bool around = repeat % 2 == 1;
+      const ServoOptions held = holding(around, true, false, false);
+      const JointVector room = limits.velocity.cwiseProduct(JointVector(random.vector(shipped.dof()).cwiseAbs()));
+      const auto chain_at = [&](const JointVector& place) {
+        JointLimits there = limits;
+        for (Eigen::Index i = 0; i < place.size(); ++i) {
+          if (around && shipped.joint_types()[static_cast<std::size_t>(i)] != JointType::Continuous) {
+            close_in(room[i], held.dt, place, i, there);
+          }
+        }
+        return shipped.with_limits(there);
+      };
+      ServoOptions options = held;
       if (repeat % 5 == 4) options.exact = {true, true, true, false, false, false};
       if (repeat % 4 == 2) options.on_limit = OnLimit::Scale;
       const bool even = repeat % 5 != 4 && repeat % 4 != 2;
-      const JointVector q = inside(random, chain), way = 0.5 * random.unit(chain.dof());
+      const JointVector q = inside(random, shipped), way = 0.5 * random.unit(shipped.dof());
       const Twist from = random.unit(6), to = random.unit(6);
+      const Chain chain = chain_at(q);
       const double sigma = test::singular_values(MatrixXd(jacobian(chain, q)))[0];
       const auto command = [&](double t) -> Twist { return from + t * (to - from); };
       const auto at_command = [&](double t) -> VectorXd { return once(chain, JParse{}, options, q, command(t)).qdot; };
-      VectorXd last = at_command(0.0), last_rule = rule(chain, JParse{}, q, from), last_state = last;
+      VectorXd last = at_command(0.0), last_rule = rule(chain, JParse{}, options, q, from), last_state = last;
       std::uint16_t joints = 0;
       double worst = 0.0, last_missed = 0.0;
       bool was_regular = false;
@@ -612,7 +818,7 @@ TEST_CASE("no jumps where the set of held joints changes, as commands move and a
       for (int k = 1; k <= kSteps; ++k) {
         const double t = static_cast<double>(k) / kSteps;
         const ServoStep step = once(chain, JParse{}, options, q, command(t));
-        const VectorXd now = step.qdot, now_rule = rule(chain, JParse{}, q, command(t));
+        const VectorXd now = step.qdot, now_rule = rule(chain, JParse{}, options, q, command(t));
         switches += step.limiting_joints != joints;
         joints = step.limiting_joints;
         const double change = (now - last).norm();
@@ -627,7 +833,7 @@ TEST_CASE("no jumps where the set of held joints changes, as commands move and a
 
         const JointVector there = q + t * way;
         const MatrixXd J = jacobian(chain, there);
-        const VectorXd now_state = once(chain, JParse{}, options, there, from).qdot;
+        const VectorXd now_state = once(chain_at(there), JParse{}, options, there, from).qdot;
         const bool is_regular = ratio(J) > 0.1;
         const double missed = (from - J * now_state).norm();
         if (even && is_regular && was_regular) {

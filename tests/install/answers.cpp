@@ -82,11 +82,19 @@ void servo(const sigmaik::Chain& arm) {
   Eigen::Isometry3d target(other->tip());  // aligned as the program's flags say
   target.translate(Eigen::Vector3d(0.05, 0.1, -0.05));
   target.rotate(Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitY()));
-  for (int cycle = 0; cycle < 300; ++cycle) step = other->update(target);
+  const JointVector offset = JointVector::Constant(arm.dof(), 0.01);
+  for (int cycle = 0; cycle < 300; ++cycle) {
+    other->measure(other->q() + offset);
+    step = other->update(target);
+  }
   std::printf("servo, pose, other options\n");
   print(step);
   print("  posture", other->options().posture);
-  print("  length_scale soft_start", {other->options().length_scale, other->options().soft_start});
+  print("  length_scale soft_start", {*other->options().length_scale, other->options().soft_start});
+  print("  following_error", other->following_error());
+  print("  slowness", other->pace().slowness);
+  print("  lag length_scale max_linear_error settling_time",
+        {plain.pace().lag, plain.length_scale(), plain.max_linear_error(), plain.settling_time()});
 }
 
 void solver(const sigmaik::Chain& arm) {

@@ -366,6 +366,7 @@ struct Setup {
   Chain chain;
   std::array<bool, 4> holds;  // limits of position, velocity, acceleration, jerk
   double recovery_speed;
+  double assumed_acceleration;  // of joints whose limits have none; infinite: none
   std::vector<Joint> joints;
   JointVector start, moving;
   bool at_once;              // the start is at rest: no command is faded in
@@ -406,7 +407,8 @@ class Episode {
     const std::array<bool, 4> holds{!random_.chance(0.05), !random_.chance(0.05), !random_.chance(0.05),
                                     !random_.chance(0.05)};
     const double recovery_speed = random_.chance(0.7) ? 0.1 : random_.decades(-1.0, 0.0);
-    Setup setup{dt, constrained, name, chain, holds, recovery_speed, {}, {}, {}, false, false};
+    const double assumed = random_.chance(0.5) ? kInfinity : random_.chance(0.5) ? 10.0 : random_.decades(-1.0, 4.0);
+    Setup setup{dt, constrained, name, chain, holds, recovery_speed, assumed, {}, {}, {}, false, false};
     draw_start(setup);
     setup.at_once = setup.moving.isZero(0.0);
     setup.position_only_start = setup.at_once && random_.chance(0.5);
@@ -445,7 +447,9 @@ class Episode {
       const Limits limits{holds[0] ? c.lower[i] : -kInfinity,
                           holds[0] ? c.upper[i] : kInfinity,
                           holds[1] ? c.velocity[i] : kInfinity,
-                          holds[2] ? c.acceleration[i] : kInfinity,
+                          !holds[2]                       ? kInfinity
+                          : std::isinf(c.acceleration[i]) ? setup.assumed_acceleration
+                                                          : c.acceleration[i],
                           holds[3] ? c.jerk[i] : kInfinity,
                           std::isinf(c.velocity[i]) ? 0.01 : setup.recovery_speed * c.velocity[i]};
       auto [q, v] = draw_joint(kind, limits);
@@ -493,9 +497,10 @@ class Episode {
 
   void describe(const Setup& setup) const {
     const JointLimits& c = setup.chain.limits();
-    std::printf("episode %u: %s, %d joints, %s, dt %.3g s, %ld cycles, %ld infeasible joints\n", number_,
-                setup.name.c_str(), setup.chain.dof(), setup.constrained ? "ConstrainedIk" : "Servo", setup.dt, length_,
-                counts_.infeasible_joints);
+    std::printf(
+        "episode %u: %s, %d joints, %s, dt %.3g s, %ld cycles, assumed acceleration %g, %ld infeasible joints\n",
+        number_, setup.name.c_str(), setup.chain.dof(), setup.constrained ? "ConstrainedIk" : "Servo", setup.dt,
+        length_, setup.assumed_acceleration, counts_.infeasible_joints);
     for (int i = 0; i < setup.chain.dof(); ++i) {
       std::printf("  joint %d: q %.6g, qdot %.4g in [%.6g, %.6g], velocity %.4g, acceleration %.4g, jerk %.4g%s\n", i,
                   setup.start[i], setup.moving[i], c.lower[i], c.upper[i], c.velocity[i], c.acceleration[i], c.jerk[i],
@@ -511,6 +516,7 @@ class Episode {
     o.limits.velocity = setup.holds[1];
     o.limits.acceleration = setup.holds[2];
     o.limits.jerk = setup.holds[3];
+    o.limits.assumed_acceleration = setup.assumed_acceleration;
     o.limits.recovery_speed = setup.recovery_speed;
   }
 
@@ -595,8 +601,8 @@ class Episode {
     if (talk_) {
       std::printf("  %s, %s, posture gain %g, gains %g, length scale %g, rows %d, exact %d%d%d%d%d%d\n",
                   sigmaik::name(method), o.on_limit == OnLimit::Scale ? "Scale" : "Redistribute", o.posture_gain,
-                  o.gain_linear, o.length_scale, o.task.rows(), o.exact[0], o.exact[1], o.exact[2], o.exact[3],
-                  o.exact[4], o.exact[5]);
+                  o.gain_linear, o.length_scale.value_or(0.0), o.task.rows(), o.exact[0], o.exact[1], o.exact[2],
+                  o.exact[3], o.exact[4], o.exact[5]);
     }
     const bool no_fade = setup.at_once || o.soft_start == 0.0;
     ChainState state;
@@ -618,7 +624,7 @@ class Episode {
       if (!s.achieved_twist.allFinite() || !s.pose_error.allFinite()) fail(kNotFinite);
       if (look && s.qdot.allFinite()) check_achieved(state, s);
       if (look && twist && s.status == Status::Ok && o.posture_gain == 0.0 && no_fade) {
-        check_done(o, state, command.twist, s);
+        check_done(o.task, servo.length_scale(), state, command.twist, s);
       }
       idle_ = command.bad || (twist && command.twist.isZero(0.0) && o.posture_gain == 0.0 && no_fade);
       q_ = s.q;
@@ -634,12 +640,13 @@ class Episode {
   }
 
   // Status::Ok: the twist is done.
-  void check_done(const ServoOptions& o, const ChainState& state, const Twist& twist, const ServoStep& s) {
+  void check_done(const Task& task, double length_scale, const ChainState& state, const Twist& twist,
+                  const ServoStep& s) {
     Twist weighted = twist, missed = twist - s.achieved_twist;
-    weighted.tail<3>() *= o.length_scale;
-    missed.tail<3>() *= o.length_scale;
-    const TaskVector asked = select_rows(o.task, state.tip.linear(), weighted);
-    const TaskVector not_done = select_rows(o.task, state.tip.linear(), missed);
+    weighted.tail<3>() *= length_scale;
+    missed.tail<3>() *= length_scale;
+    const TaskVector asked = select_rows(task, state.tip.linear(), weighted);
+    const TaskVector not_done = select_rows(task, state.tip.linear(), missed);
     if (!(not_done.norm() <= 2.0 * kDone * asked.norm())) fail(kReport);
   }
 

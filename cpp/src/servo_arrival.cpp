@@ -1,0 +1,117 @@
+// How fast the rule's answer may be done: so that the arm can stop at its target, and within the velocity limits.
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <sigmaik/servo.hpp>
+
+#include "numbers.hpp"
+
+namespace sigmaik {
+
+using detail::kInfinity;
+
+// Pose targets: the part of q̇ that closes the error becomes no faster than the joints can stop within what is left of
+// the way, q̇/gain, and calm. The part that follows the target's own motion stays. Returns whether q̇ changed.
+bool Servo::arrive(const Twist& feedforward, JointVector& qdot) noexcept {
+  const double gain = std::max(options_.gain_linear, options_.gain_angular);
+  if (gain == 0.0) return false;
+  if (feedforward.isZero(0.0)) {
+    const double part = calm() * tracker_.arrival(qdot, gain);
+    if (part < 1.0) qdot *= part;
+    return part < 1.0;
+  }
+  VelocitySolver solver = solver_;  // the decomposition of this cycle is the warm start
+  const JointVector follow = solver.solve(state_.jacobian, feedforward, JointVector(), state_.tip.linear()).qdot;
+  const JointVector close = qdot - follow;
+  const double part = calm() * tracker_.arrival(close, gain);
+  if (part < 1.0) qdot = follow + part * close;
+  return part < 1.0;
+}
+
+// In (0, 1], the factor on the motion towards a target that rests; see Servo, Rest.
+double Servo::calm() const noexcept {
+  constexpr int kFree = 2;       // reversals that a path takes now and then, where it bends
+  constexpr double kLess = 0.7;  // of the gain stays at each further reversal
+  constexpr double kFade = 1.0;  // [s] time constant after the settling time
+  double part = 1.0;
+  if (reversals_ > kFree) part = std::pow(kLess, std::min(reversals_ - kFree, 20));
+  if (rested_ > settling_time_) part *= std::exp(std::max(-50.0, (settling_time_ - rested_) / kFade));
+  return part;
+}
+
+// A reversal: q̇, in parts of the velocity limits, points against the fastest q̇ since the last reversal.
+void Servo::count_reversals(const JointVector& qdot) noexcept {
+  constexpr double kSlow = 1e-4;  // of the velocity limits: a slower motion is at rest
+  double along = 0.0, now = 0.0, then = 0.0;
+  for (int i = 0; i < chain_.dof(); ++i) {
+    const double limit = tracker_.velocity_limit(i), per = limit < kInfinity ? 1.0 / limit : 1.0;
+    const double v = per * qdot[i], w = per * last_way_[i];
+    along += v * w;
+    now += v * v;
+    then += w * w;
+  }
+  if (now < kSlow * kSlow) return;
+  if (along < 0.0) ++reversals_;
+  if (along < 0.0 || now > then) last_way_ = qdot;
+}
+
+// Velocity limits: the motion keeps its direction, and gives up speed. Where the arm can move without moving the tool,
+// this motion takes part first (Flacco, De Luca and Khatib 2015): of all velocities inside the limits whose twist is a
+// part s of the rule's, the answer has the largest s, and of these the answer is the nearest to the rule's. Where there
+// are exact rows, this is their twist, and the other rows give way before these rows do. Returns whether q̇ changed.
+bool Servo::slow_down(ServoStep& step) noexcept {
+  const int n = chain_.dof();
+  double part = 1.0;
+  int slowest = -1;
+  for (int i = 0; i < n; ++i) {
+    const double size = std::abs(step.qdot[i]), limit = tracker_.velocity_limit(i);
+    if (size * part > limit) {
+      part = limit / size;
+      slowest = i;
+    }
+  }
+  if (slowest < 0) return false;
+  const Spectrum& spectrum = has_exact() ? exact_spectrum_ : solver_.spectrum();
+  if (options_.on_limit == OnLimit::Scale || spectrum.size() >= n) {
+    step.qdot *= part;
+    step.limiting_joints |= static_cast<std::uint16_t>(1u << slowest);
+    return true;
+  }
+  // In x = q̇ − q̇_rule and t = (1 − s)/kSlower: min |x|² + t² where J x + kSlower J q̇_rule t = 0. In the coordinates of
+  // the singular vectors the rows are v_iᵀ, so that a singular direction of J weighs as much as another.
+  constexpr double kSlower = 1e-3;
+  const double largest = step.qdot.cwiseAbs().maxCoeff();
+  const auto m = spectrum.size();
+  problem_.C.setZero(m, n + 1);
+  for (int i = 0; i < m; ++i) {
+    problem_.C.row(i).head(n) = spectrum.v(i).transpose();
+    problem_.C(i, n) = kSlower * spectrum.v(i).dot(step.qdot) / largest;
+  }
+  problem_.d.setZero(m);
+  problem_.lower.resize(n + 1);
+  problem_.upper.resize(n + 1);
+  for (int i = 0; i < n; ++i) {
+    const double limit = tracker_.velocity_limit(i);
+    problem_.lower[i] = (-limit - step.qdot[i]) / largest;
+    problem_.upper[i] = (limit - step.qdot[i]) / largest;
+  }
+  problem_.lower[n] = 0.0;
+  problem_.upper[n] = 1.0 / kSlower;
+  const LeastSquaresSolution solution = slowing_.solve(problem_);
+  if (solution.status == LeastSquaresStatus::Optimal) {
+    step.qdot += largest * solution.x.head(n);
+    step.limiting_joints |= static_cast<std::uint16_t>((solution.at_lower | solution.at_upper) & ((1u << n) - 1u));
+    for (int i = 0; i < n; ++i) {
+      const double limit = tracker_.velocity_limit(i);
+      step.qdot[i] = std::clamp(step.qdot[i], -limit, limit);
+    }
+  } else {  // numbers too far apart
+    step.qdot *= part;
+    step.limiting_joints |= static_cast<std::uint16_t>(1u << slowest);
+  }
+  return true;
+}
+
+}  // namespace sigmaik
