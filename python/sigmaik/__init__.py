@@ -3,7 +3,7 @@
     import sigmaik as sk
 
     arm = sk.robots.load("ufactory_xarm7")              # or sk.Chain.from_urdf("arm.urdf")
-    servo = sk.Servo(arm, sk.JParse(gamma=0.1), dt=1e-3)
+    servo = sk.Servo(arm, dt=1e-3)
     servo.reset(q)                                      # (n,) [rad or m]
     step = servo.update(target)                         # (4, 4), tip in base; or servo.update_twist([v; ω])
     step.q, step.qdot, step.status

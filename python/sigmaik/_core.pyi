@@ -212,6 +212,12 @@ class Chain:
         Name of the base link.
         """
     @property
+    def characteristic_length(self) -> float:
+        """
+        [m] the lever arm of the joints that turn: the root mean square of the distance from a joint's axis
+        to the tip, over these joints and over all turns of the joints after each (Angeles).
+        """
+    @property
     def dof(self) -> int:
         """
         Number of movable joints, n.
@@ -347,7 +353,7 @@ class JParse(Method):
     """
     short_name: typing.ClassVar[str] = 'jparse'
     title: typing.ClassVar[str] = 'J-PARSE'
-    def __init__(self, gamma: typing.SupportsFloat | typing.SupportsIndex = 0.1, gain_linear: typing.SupportsFloat | typing.SupportsIndex = 1.0, gain_angular: typing.SupportsFloat | typing.SupportsIndex = 1.0, continuous: bool = True, singular_posture: bool = False) -> None:
+    def __init__(self, gamma: typing.SupportsFloat | typing.SupportsIndex = 0.1, gain_linear: typing.SupportsFloat | typing.SupportsIndex = 1.0, gain_angular: typing.SupportsFloat | typing.SupportsIndex = 1.0, continuous: bool = True, singular_posture: bool = False, adaptive: bool = True) -> None:
         """
         gamma: threshold in (0, 1] on σ_i/σ_max.
         gain_linear: the paper's K ≥ 0, for the command's linear rows.
@@ -357,6 +363,13 @@ class JParse(Method):
         singular_posture: the posture acts along singular directions, as far as J-PARSE's own inverse does
             not, by its I − J⁺J: an arm that was stretched out folds back to the side of its posture. False:
             the posture does not act there, as published.
+        adaptive: the threshold is min(γσ_max, the σ_i that the command along u_i needs to stay within the
+            arm's velocity and acceleration limits); False, and in a VelocitySolver: γσ_max, as published.
+        """
+    @property
+    def adaptive(self) -> bool:
+        """
+        the threshold is min(γσ_max, the σ_i that the command along u_i needs to stay within the arm's velocity and acceleration limits); False, and in a VelocitySolver: γσ_max, as published.
         """
     @property
     def continuous(self) -> bool:
@@ -658,6 +671,11 @@ class ServoStep:
         Indices of the joints held at a limit that the rule's answer would break.
         """
     @property
+    def not_settling(self) -> bool:
+        """
+        The target has rested for longer than any motion takes (Servo.settling_time), and the arm still moves.
+        """
+    @property
     def pose_error(self) -> numpy.typing.NDArray[numpy.float64]:
         """
         (6,) [m, rad] target minus tip before the step, unshortened; zero for twist commands
@@ -704,18 +722,19 @@ class Servo:
     """
     Drives a chain's reference configuration towards poses, or along twists, one cycle a call.
 
-    It integrates its own command (q ← q + q̇ dt) and reads no measured positions. Every command holds
+    It integrates its own command (q ← q + q̇ dt) and needs no measured positions (`measure`). Every command holds
     the chain's limits and leaves room to go on holding them; a start outside them comes back.
     """
-    def __init__(self, chain: Chain, method: Method | str, dt: typing.SupportsFloat | typing.SupportsIndex = 0.001, *, gain_linear: typing.SupportsFloat | typing.SupportsIndex = 5.0, gain_angular: typing.SupportsFloat | typing.SupportsIndex = 5.0, max_linear_error: typing.SupportsFloat | typing.SupportsIndex = 0.25, max_angular_error: typing.SupportsFloat | typing.SupportsIndex = 1.0, soft_start: typing.SupportsFloat | typing.SupportsIndex = 0.1, posture: numpy.typing.ArrayLike | None = None, posture_gain: typing.SupportsFloat | typing.SupportsIndex = 0.0, posture_max_speed: typing.SupportsFloat | typing.SupportsIndex = ..., avoid: typing.Literal['manipulability', 'potential'] | None = None, avoid_gain: typing.SupportsFloat | typing.SupportsIndex = 1.0, avoid_max_speed: typing.SupportsFloat | typing.SupportsIndex = 0.5, eta1: typing.SupportsFloat | typing.SupportsIndex = 0.0, eta2: typing.SupportsFloat | typing.SupportsIndex = 10.0, position_limits: bool = True, velocity_limits: bool = True, acceleration_limits: bool = True, jerk_limits: bool = True, recovery_speed: typing.SupportsFloat | typing.SupportsIndex = 0.1, on_limit: typing.Literal['redistribute', 'scale'] = 'redistribute', exact: numpy.typing.ArrayLike | None = (0, 0, 0, 0, 0, 0), length_scale: typing.SupportsFloat | typing.SupportsIndex = 1.0, mask: numpy.typing.ArrayLike | None = (1, 1, 1, 1, 1, 1), frame: typing.Literal['base', 'tool'] = 'base') -> None:
+    def __init__(self, chain: Chain, method: Method | str | None = None, dt: typing.SupportsFloat | typing.SupportsIndex = 0.001, *, gain_linear: typing.SupportsFloat | typing.SupportsIndex = 10.0, gain_angular: typing.SupportsFloat | typing.SupportsIndex = 10.0, max_linear_error: typing.SupportsFloat | typing.SupportsIndex | None = None, max_angular_error: typing.SupportsFloat | typing.SupportsIndex = 1.0, soft_start: typing.SupportsFloat | typing.SupportsIndex = 0.1, posture: numpy.typing.ArrayLike | None = None, posture_gain: typing.SupportsFloat | typing.SupportsIndex = 0.0, posture_max_speed: typing.SupportsFloat | typing.SupportsIndex = ..., avoid: typing.Literal['manipulability', 'potential'] | None = None, avoid_gain: typing.SupportsFloat | typing.SupportsIndex = 1.0, avoid_max_speed: typing.SupportsFloat | typing.SupportsIndex = 0.5, eta1: typing.SupportsFloat | typing.SupportsIndex = 0.0, eta2: typing.SupportsFloat | typing.SupportsIndex = 10.0, position_limits: bool = True, velocity_limits: bool = True, acceleration_limits: bool = True, jerk_limits: bool = True, assumed_acceleration: typing.SupportsFloat | typing.SupportsIndex = 10.0, recovery_speed: typing.SupportsFloat | typing.SupportsIndex = 0.1, on_limit: typing.Literal['redistribute', 'scale'] = 'redistribute', exact: numpy.typing.ArrayLike | None = (0, 0, 0, 0, 0, 0), length_scale: typing.SupportsFloat | typing.SupportsIndex | None = None, mask: numpy.typing.ArrayLike | None = (1, 1, 1, 1, 1, 1), frame: typing.Literal['base', 'tool'] = 'base') -> None:
         """
         Warns (ModelWarning) of velocity and acceleration limits that joints lack.
 
+        method: None: JParse(), the best that there is.
         dt: [s] > 0, from one update to the next.
         gain_linear: [1/s] ≥ 0, from position error to velocity. (JParse's gain_linear is another thing: the
             paper's K.)
         gain_angular: [1/s] ≥ 0, from orientation error to angular velocity.
-        max_linear_error: [m] > 0: longer position errors are shortened to it.
+        max_linear_error: [m] > 0: longer position errors are shortened to it. None: half of length_scale.
         max_angular_error: [rad] > 0: longer orientation errors are shortened to it.
         soft_start: [s] ≥ 0 over which a pose target's command is faded in after reset(); twists only where
             reset() was told that the arm moves.
@@ -734,13 +753,18 @@ class Servo:
         velocity_limits: the same for its velocity limits.
         acceleration_limits: the same for its acceleration limits.
         jerk_limits: the same for its jerk limits.
+        assumed_acceleration: [rad/s² or m/s²] > 0, the acceleration limit of joints whose model has none;
+            inf: they have none.
         recovery_speed: in (0, 1], of the velocity limit: the least speed at which a joint that starts
             outside its position limits comes back.
-        on_limit: what gives way at a limit. 'redistribute': other joints take over, for the nearest twist
-            that limits allow; 'scale': the direction is kept, speed is given up.
-        exact: (6,) truth values: the rows (vx, vy, vz, ωx, ωy, ωz) that come before the others when
-            redistributing.
-        length_scale: [m] > 0: 1 rad/s weighs as much as length_scale m/s, as for VelocitySolver.
+        on_limit: what gives way at a position limit. 'redistribute': other joints take over, for the
+            nearest twist that limits allow; 'scale': the direction is kept, speed is given up. At a
+            velocity limit the direction is kept; 'redistribute' first uses the motion that does not move
+            the tool.
+        exact: (6,) truth values: the rows (vx, vy, vz, ωx, ωy, ωz) that come before the others in every
+            cycle.
+        length_scale: [m] > 0: 1 rad/s weighs as much as length_scale m/s, as for VelocitySolver. None:
+            chain.characteristic_length.
         mask: (6,) truth values: the rows (vx, vy, vz, ωx, ωy, ωz) that matter; None: all.
         frame: the axes of these rows, the base's or the tool's.
         """
@@ -756,11 +780,25 @@ class Servo:
         """
         One cycle of the fastest stop that the limits allow, or of rest: HOLDING.
         """
-    def reset(self, q: numpy.typing.ArrayLike, qdot: numpy.typing.ArrayLike | None = None) -> None:
+    def measure(self, q: numpy.typing.ArrayLike, qdot: numpy.typing.ArrayLike | None = None) -> None:
+        """
+        Tells the servo where the arm is, before `update`: in each cycle, or as often as the arm is measured.
+
+        The pose error of `update` is then that of the arm and not that of the reference, through a low-pass filter of
+        0.1 s: the tool arrives although the joints' controllers leave an error, and noise does not enter the command.
+        The command stays continuous and inside all limits, which hold for the reference.
+
+        q: (n,) measured positions [rad or m].
+        qdot: (n,) measured velocities, with which the filter does not lag; None: unknown.
+        """
+    def reset(self, q: numpy.typing.ArrayLike, qdot: numpy.typing.ArrayLike | None = None, qddot: numpy.typing.ArrayLike | None = None) -> None:
         """
         Starts, or starts again, at q (n,): forgets all history, and pins the posture there unless one was given.
 
         qdot: (n,) how the arm moves now, from which the command is faded; None: it stands.
+        qddot: (n,) its acceleration, which matters to jerk limits. None: joints whose q and qdot are those of the last
+            step keep the acceleration that the servo knows; of other joints none is assumed.
+        To tell a running servo where the arm is, call `measure`.
         Warns (ModelWarning) of a joint that starts more than 1 rad or 1 m outside its limits.
         """
     def update(self, target: typing.Any, feedforward: numpy.typing.ArrayLike | None = None) -> ServoStep:
@@ -784,6 +822,16 @@ class Servo:
         [s]
         """
     @property
+    def following_error(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (n,) measured minus commanded position [rad or m], filtered; zero before `measure`.
+        """
+    @property
+    def length_scale(self) -> float:
+        """
+        [m] 1 rad weighs as much as this length.
+        """
+    @property
     def method(self) -> Method:
         """
         The rule; may be changed between cycles.
@@ -805,6 +853,11 @@ class Servo:
     def q(self) -> numpy.typing.NDArray[numpy.float64]:
         """
         (n,) where the reference stands.
+        """
+    @property
+    def settling_time(self) -> float:
+        """
+        [s], after which a motion towards a target that rests is called not settling.
         """
 
 # ---- Servo loop -------------------------------------------------------------------------------------------------------
@@ -1267,7 +1320,7 @@ class ConstrainedIk:
     Follows a target pose inside every joint limit: an exact part, and the rest as well as the
     limits allow (Schreiber, Otter and Hirzinger 1999).
     """
-    def __init__(self, chain: Chain, dt: typing.SupportsFloat | typing.SupportsIndex = 0.001, *, exact: numpy.typing.ArrayLike | None = (1, 1, 1, 0, 0, 0), alpha: numpy.typing.ArrayLike | None = 1.0, beta: numpy.typing.ArrayLike | None = 5.0, gamma: typing.SupportsFloat | typing.SupportsIndex | None = None, max_error: numpy.typing.ArrayLike | None = ..., iterations: typing.SupportsInt | typing.SupportsIndex = 2, torque_limits: bool = False, analytic: bool = True, mask: numpy.typing.ArrayLike | None = (1, 1, 1, 1, 1, 1), frame: typing.Literal['base', 'tool'] = 'base', gravity: numpy.typing.ArrayLike | None = (0.0, 0.0, -9.80665), position_limits: bool = True, velocity_limits: bool = True, acceleration_limits: bool = True, jerk_limits: bool = True, recovery_speed: typing.SupportsFloat | typing.SupportsIndex = 0.1) -> None:
+    def __init__(self, chain: Chain, dt: typing.SupportsFloat | typing.SupportsIndex = 0.001, *, exact: numpy.typing.ArrayLike | None = (1, 1, 1, 0, 0, 0), alpha: numpy.typing.ArrayLike | None = 1.0, beta: numpy.typing.ArrayLike | None = 5.0, gamma: typing.SupportsFloat | typing.SupportsIndex | None = None, max_error: numpy.typing.ArrayLike | None = ..., iterations: typing.SupportsInt | typing.SupportsIndex = 2, torque_limits: bool = False, analytic: bool = True, mask: numpy.typing.ArrayLike | None = (1, 1, 1, 1, 1, 1), frame: typing.Literal['base', 'tool'] = 'base', gravity: numpy.typing.ArrayLike | None = (0.0, 0.0, -9.80665), position_limits: bool = True, velocity_limits: bool = True, acceleration_limits: bool = True, jerk_limits: bool = True, assumed_acceleration: typing.SupportsFloat | typing.SupportsIndex = 10.0, recovery_speed: typing.SupportsFloat | typing.SupportsIndex = 0.1) -> None:
         """
         Warns (ModelWarning) of velocity and acceleration limits that joints lack.
 
@@ -1294,6 +1347,8 @@ class ConstrainedIk:
         velocity_limits: the same for its velocity limits.
         acceleration_limits: the same for its acceleration limits.
         jerk_limits: the same for its jerk limits.
+        assumed_acceleration: [rad/s² or m/s²] > 0, the acceleration limit of joints whose model has none;
+            inf: they have none.
         recovery_speed: in (0, 1], of the velocity limit: the least speed at which a joint that starts
             outside its position limits comes back.
         """

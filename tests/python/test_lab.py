@@ -76,7 +76,8 @@ def options_of(name):
 
 def test_all_commands_are_found():
     assert set(STUDIES) == {
-        "axis5", "cart", "drill", "execute", "limits", "montecarlo", "reach", "reaching", "round-table", "track",
+        "arrival", "axis5", "cart", "drill", "execute", "limits", "montecarlo", "reach", "reaching", "round-table",
+        "track",
     }  # fmt: skip
     assert set(study.names()) - set(STUDIES) == {"info", "robots", "teleop"}
     for name in study.names():
@@ -280,6 +281,7 @@ def test_progress_is_a_line_now_and_then():
 @pytest.mark.parametrize("name", [n for n in STUDIES if n not in ("execute", "drill", "cart")])
 def test_every_study_says_how_far_it_is(name, tmp_path):
     words = {
+        "arrival": "--robot ur10 --trials 2 --time 0.5 --rate 100",
         "axis5": "--example 2 --dt 0.02",
         "limits": "--robot ur10 --rate 100 --seconds 1 --pace 0.02 --trials 1",
         "montecarlo": "--robot franka_panda --samples 2 --jobs 1 --objective none",

@@ -44,13 +44,18 @@ def test_an_inertia_that_no_body_has():
         sk.Chain.from_urdf(TWO_JOINTS.format(inertial=inertia, velocity='velocity="3"'))
 
 
-@pytest.mark.parametrize("make", [lambda arm: sk.Servo(arm, sk.JParse()), sk.ConstrainedIk])
+@pytest.mark.parametrize("make", [sk.Servo, sk.ConstrainedIk])
 def test_no_acceleration_limits(make):
     arm = sk.robots.load("ur10")
-    with pytest.warns(sk.ModelWarning, match="the joints have no acceleration limit: a command may change") as told:
+    with pytest.warns(
+        sk.ModelWarning, match="the joints have no acceleration limit: 10 rad/s² or m/s² are assumed"
+    ) as told:
         make(arm)
     assert len(told) == 1
     make(arm.with_limits(acceleration=10.0))
+    make(arm, assumed_acceleration=5.0)  # who says what to assume knows
+    make(arm, assumed_acceleration=np.inf)
+    make(arm, acceleration_limits=False)
     assert arm.missing_limits(acceleration=False) == ()
 
 

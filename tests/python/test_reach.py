@@ -69,6 +69,13 @@ def test_xarm7_settles_where_an_independent_simulation_does(path, method, expect
     assert settled(XARM, path, method) == pytest.approx(expected, abs=1.0)
 
 
+def test_the_papers_threshold_is_fixed():
+    assert not methods.parse_method("jparse").method.adaptive
+    assert not any(m.method.adaptive for m in methods.singular_gain_sweep((1.0, 2.0), gamma=0.1))
+    assert methods.parse_method("jparse:adaptive=true").method.adaptive
+    assert load(XARM, LINE).settings.length_scale == 1.0
+
+
 @pytest.mark.parametrize("path", [LINE, ELLIPSE])
 def test_pseudo_inverse_explodes(path):
     assert max(row.max_joint_speed for row in rows(XARM, path, "pinv")) > 100.0

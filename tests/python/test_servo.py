@@ -25,6 +25,14 @@ def offset(pose, translation=(0, 0, 0), rotvec=(0, 0, 0)):
     return out
 
 
+def fixed(method):
+    """The method with a threshold that does not depend on the limits."""
+    if not isinstance(method, sk.JParse):
+        return method
+    names = ("gamma", "gain_linear", "gain_angular", "continuous", "singular_posture")
+    return sk.JParse(**{name: getattr(method, name) for name in names}, adaptive=False)
+
+
 # Only the rule.
 NO_LIMITS = {f"{kind}_limits": False for kind in ("position", "velocity", "acceleration", "jerk")}
 
@@ -75,12 +83,16 @@ def test_pose_error_is_scipys(arm):
         np.testing.assert_allclose(step.pose_error, [*translation, *rotvec], rtol=0, atol=1e-12)
 
 
+#: Rules whose answer does not depend on the limits.
+FIXED = [fixed(method) for method in METHODS]
+
+
 def test_scaling_keeps_the_direction(arm):
     chain, home = arm
     rng = np.random.default_rng(3)
     slow = chain.with_limits(velocity=rng.uniform(0.05, 0.5, chain.dof))
     limited = 0
-    for method in METHODS:
+    for method in FIXED:
         for _ in range(10):
             free = sk.Servo(slow, method, **NO_LIMITS)
             held = sk.Servo(slow, method, **{**NO_LIMITS, "velocity_limits": True}, on_limit="scale")
@@ -106,6 +118,28 @@ def test_scaling_keeps_the_direction(arm):
     assert limited > 50
 
 
+def test_velocity_limits_keep_the_direction_of_the_adaptive_rule(arm):
+    """A command that is too fast, and the same command three times as fast, give the same motion."""
+    chain, home = arm
+    rng = np.random.default_rng(4)
+    slow = chain.with_limits(velocity=rng.uniform(0.05, 0.5, chain.dof))
+    limited = 0
+    stretched = np.clip(0.05 * home, chain.limits.lower + 0.01, chain.limits.upper - 0.01)  # some arms nearly are
+    for q in (home, home, stretched):
+        for _ in range(10):
+            twist, steps = rng.normal(size=6), []
+            for factor in (1.0, 3.0):
+                servo = sk.Servo(slow, **{**NO_LIMITS, "velocity_limits": True}, on_limit="scale")
+                servo.reset(q)
+                steps.append(servo.update_twist(factor * twist))
+                check_step(steps[-1], slow, q, 1e-3)
+            assert steps[1].limiting_joints
+            if steps[0].limiting_joints:
+                limited += 1
+                np.testing.assert_allclose(steps[1].qdot, steps[0].qdot, rtol=1e-9, atol=1e-12)
+    assert limited > 10
+
+
 def test_redistribution_says_what_it_misses(arm):
     """LIMITED where the tool misses more than a ten-thousandth of the rule's twist; else other joints took over."""
     chain, home = arm
@@ -117,7 +151,7 @@ def test_redistribution_says_what_it_misses(arm):
         steps = []
         for on_limit in (None, "redistribute", "scale"):
             options = {**NO_LIMITS, "velocity_limits": on_limit is not None}
-            servo = sk.Servo(slow, sk.JParse(), **options, on_limit=on_limit or "scale")
+            servo = sk.Servo(slow, sk.JParse(adaptive=False), **options, on_limit=on_limit or "scale")
             servo.reset(home)
             steps.append(servo.update_twist(twist))
         free, held, scaled = steps
@@ -143,20 +177,58 @@ def test_redistribution_says_what_it_misses(arm):
     assert sk.Status.LIMITED in statuses
 
 
-def test_what_comes_first_is_exact_where_it_can_be():
+POSITION_FIRST = [1, 1, 1, 0, 0, 0]
+
+
+def first_steps(chain, q, twist, **options):
+    """The first step without a priority, and with the position first."""
+    steps = []
+    for exact in (None, POSITION_FIRST):
+        servo = sk.Servo(chain, exact=exact, acceleration_limits=False, **options)
+        servo.reset(q)
+        steps.append(servo.update_twist(twist))
+    return steps
+
+
+def test_what_comes_first_is_exact_where_position_limits_block():
+    chain, home = sk.robots.load("franka_panda"), sk.robots.home("franka_panda")
+    room = np.array([1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0]) + 1e-12  # the wrist is blocked on both sides
+    blocked = chain.with_limits(lower=home - room, upper=home + room)
+    twist = [0.1, 0.05, -0.1, 0.4, 0.4, -0.4]
+    level, first = first_steps(blocked, home, twist)
+    assert np.linalg.norm(level.achieved_twist[:3] - twist[:3]) > 1e-2
+    np.testing.assert_allclose(first.achieved_twist[:3], twist[:3], atol=1e-5)
+    assert np.linalg.norm(first.achieved_twist[3:] - twist[3:]) > 1e-2
+    assert first.status == sk.Status.LIMITED
+    with pytest.raises(sk.Error, match="exact"):
+        sk.Servo(chain, mask=[1, 1, 1, 1, 1, 0], exact=[0, 0, 0, 0, 0, 1])
+
+
+def test_what_comes_first_is_exact_where_nothing_is_limited():
+    """Five joints cannot turn the tool about every axis: the position is exact, and without a priority it is not."""
+    chain = sk.robots.load("ur10").with_limits(lower=[*[-7.0] * 5, -1e-12], upper=[*[7.0] * 5, 1e-12])
+    q = np.array([0.0, -1.2, 1.5, -1.2, -1.57, 0.0])
+    stretched = np.array([0.0, -1.2, 0.02, -1.2, -1.57, 0.0])
+    for here in (q, stretched):
+        level, first = first_steps(chain, here, [0.02, 0.01, -0.02, 0.0, 0.0, 0.3])
+        assert np.linalg.norm(level.achieved_twist[:3] - [0.02, 0.01, -0.02]) > 1e-3
+        if here is q:
+            np.testing.assert_allclose(first.achieved_twist[:3], [0.02, 0.01, -0.02], atol=1e-5)
+
+
+def test_velocity_limits_slow_the_motion_down_and_leave_what_comes_first_exact():
     chain, home = sk.robots.load("franka_panda"), sk.robots.home("franka_panda")
     slow = chain.with_limits(velocity=[2.0, 2.0, 2.0, 2.0, 0.1, 0.1, 0.1])
-    twist = [0.1, 0.05, -0.1, 0.8, 0.8, -0.8]
-    steps = []
-    for exact in (None, [1, 1, 1, 0, 0, 0]):
-        servo = sk.Servo(slow, sk.JParse(), acceleration_limits=False, exact=exact)
-        servo.reset(home)
-        steps.append(servo.update_twist(twist))
-    assert np.linalg.norm(steps[0].achieved_twist[:3] - twist[:3]) > 1e-2
-    np.testing.assert_allclose(steps[1].achieved_twist[:3], twist[:3], atol=1e-5)
-    assert steps[1].status == sk.Status.LIMITED
-    with pytest.raises(sk.Error, match="exact"):
-        sk.Servo(slow, sk.JParse(), mask=[1, 1, 1, 1, 1, 0], exact=[0, 0, 0, 0, 0, 1])
+    twist = np.array([0.1, 0.05, -0.1, 0.8, 0.8, -0.8])
+    level, first = first_steps(slow, home, twist)
+    part = np.linalg.norm(level.achieved_twist) / np.linalg.norm(twist)
+    assert 0.1 < part < 0.2
+    np.testing.assert_allclose(level.achieved_twist, part * twist, atol=1e-5)
+    assert level.scale == pytest.approx(part, rel=1e-3)
+    np.testing.assert_allclose(first.achieved_twist[:3], twist[:3], atol=1e-5)
+    for step in (level, first):
+        assert step.status == sk.Status.LIMITED
+        assert np.abs(step.qdot / slow.limits.velocity).max() == pytest.approx(1.0)
 
 
 def test_a_start_outside_comes_back_by_itself(arm):
@@ -413,6 +485,12 @@ def test_reset_with_a_wrong_size(n):
     servo.reset(np.zeros(6))
     with pytest.raises(sk.Error, match="qdot has shape"):
         servo.reset(np.zeros(6), np.zeros(n))
+    with pytest.raises(sk.Error, match="qddot has shape"):
+        servo.reset(np.zeros(6), np.zeros(6), np.zeros(n))
+    with pytest.raises(sk.Error, match="q has shape"):
+        servo.measure(np.zeros(n))
+    with pytest.raises(sk.Error, match="qdot has shape"):
+        servo.measure(np.zeros(6), np.zeros(n))
 
 
 def test_reset_with_what_is_not_finite():
@@ -443,6 +521,8 @@ def test_reset_with_what_is_not_finite():
         {"length_scale": 0.0},
         {"length_scale": np.nan},
         {"on_limit": "ignore"},
+        {"assumed_acceleration": 0.0},
+        {"assumed_acceleration": np.nan},
         {"recovery_speed": 0.0},
         {"recovery_speed": 1.1},
         {"exact": [1] * 5},
@@ -470,7 +550,7 @@ def test_beyond_numbers():
 
 def test_what_can_be_asked_of_a_servo():
     chain = sk.robots.load("ur10")
-    servo = sk.Servo(chain, sk.JParse(0.2), 0.002)
+    servo = sk.Servo(chain, sk.JParse(0.2), 0.002, acceleration_limits=False)
     assert servo.dt == 0.002
     assert servo.chain.joint_names == chain.joint_names
     assert servo.method == sk.JParse(0.2)

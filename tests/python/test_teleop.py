@@ -117,6 +117,11 @@ def test_settings_change_without_a_kick(session):
         ({"gain_linear": -1.0}, "gain_linear"),
         ({"gain_linear": "fast"}, "gain_linear"),
         ({"gain_linear": True}, "gain_linear"),
+        ({"gain_linear": None}, "gain_linear"),
+        ({"max_linear_error": 0.0}, "max_linear_error"),
+        ({"max_linear_error": "far"}, "max_linear_error must be a finite number or None"),
+        ({"length_scale": float("inf")}, "length_scale must be a finite number or None"),
+        ({"assumed_acceleration": 0.0}, "assumed_acceleration"),
         ({"on_limit": "break"}, "on_limit"),
         ({"on_limit": 3}, "on_limit"),
         ({"limits": "no"}, "limits"),
@@ -133,17 +138,56 @@ def test_refused_settings_leave_all_as_it_is(session, change, words):
     assert session.settings == before
 
 
-@pytest.mark.parametrize("wrong", [{"rate": 0.0}, {"rate": 1e6}, {"acceleration": 0.0}, {"pose_timeout": -1.0}])
+@pytest.mark.parametrize("wrong", [{"rate": 0.0}, {"rate": 1e6}, {"pose_timeout": -1.0}])
 def test_refused_sessions(wrong):
     with pytest.raises(ValueError, match=next(iter(wrong))):
         Session("ur10", **wrong)
 
 
 def test_accelerations_that_nobody_gave_are_assumed_and_named():
-    session = Session("ur10", acceleration=7.0)
+    session = Session("ur10")
     assert session.assumed == session.chain.joint_names
-    np.testing.assert_array_equal(session.chain.limits.acceleration, 7.0)
+    assert session.settings.assumed_acceleration == sk.Servo(session.chain).options["assumed_acceleration"] == 10.0
     assert Session("franka_panda").assumed == ()
+    for wrong in (0.0, -1.0, float("nan"), "fast", True):
+        with pytest.raises(ValueError, match="assumed_acceleration"):
+            Session("ur10", settings=Settings(assumed_acceleration=wrong))
+
+
+def test_accelerations_that_are_assumed_are_held_and_counted():
+    with Session("ur10", rate=500.0, settings=Settings(assumed_acceleration=3.0)) as session:
+        until(lambda: latest(session) is not None)
+        session.start_recording()
+        session.follow(moved(session, 0.0, 0.2, 0.2))
+        until(lambda: np.abs(latest(session)["qdot"]).max() > 0.1)
+        session.configure(assumed_acceleration=float("inf"))
+        time.sleep(0.1)
+        session.configure(assumed_acceleration=3.0)
+        time.sleep(0.1)
+        episode = session.stop_recording()
+    assert episode.broken_limits()["acceleration"] == 0
+    held = np.array([episode.settings[c].assumed_acceleration for c in episode["configuration"].tolist()]) == 3.0
+    change = np.abs(np.diff(episode["qdot"], axis=0)).max(axis=1) / episode.dt
+    assert 2.9 < change[held[1:] & held[:-1]].max() < 3.0 * (1.0 + 1e-6)
+    samples = episode.samples.copy()
+    samples["qdot"][np.flatnonzero(held)[2], 0] += 1.0
+    assert (
+        Episode(samples, episode.arm, episode.dt, episode.settings, episode.before).broken_limits()["acceleration"] > 0
+    )
+
+
+def test_settings_are_the_servos_defaults():
+    arm = sk.robots.load("ufactory_xarm7")
+    servo = Settings().servo(arm, 1e-3, sk.robots.home("ufactory_xarm7"))
+    ours, product = servo.options, sk.Servo(arm).options
+    assert {name for name in ours if not np.array_equal(ours[name], product[name])} == {"posture", "posture_gain"}
+    assert servo.method == sk.JParse(singular_posture=True)
+    session = Session("ufactory_xarm7")
+    assert session.length_scale == servo.length_scale == arm.characteristic_length
+    session.configure(length_scale=0.5)
+    assert session.length_scale == 0.5
+    session.configure(length_scale=None, max_linear_error=0.1)
+    assert session.length_scale == arm.characteristic_length
 
 
 # --- recordings
@@ -446,7 +490,7 @@ def test_the_lines_drawn_are_the_rules_singular_directions(method):
         assert 0.1 < np.linalg.norm(part) <= 1.0 + 1e-12
     if not step.singular.any():
         assert len(linear) == len(angular) == 0
-    values = task_singular_values(arm.jacobian(q), rotation, settings)
+    values = task_singular_values(arm.jacobian(q), rotation, settings, servo.length_scale)
     np.testing.assert_allclose(values, step.singular_values, rtol=1e-9, atol=1e-12)
 
 

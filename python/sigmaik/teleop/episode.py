@@ -92,14 +92,17 @@ class Episode:
         The keys are position, velocity and acceleration. The first cycles after a start outside the limits count, too.
         """
         limits = self.arm.chain.limits
-        on = np.array([self.settings[number].limits for number in self["configuration"].tolist()], dtype=bool)
+        settings = [self.settings[number] for number in self["configuration"].tolist()]
+        on = np.array([s.limits for s in settings], dtype=bool)
+        assumed = np.array([s.assumed_acceleration for s in settings])[:, None]
+        acceleration = np.where(np.isfinite(limits.acceleration), limits.acceleration, assumed)
         q, qdot = self["q"], self["qdot"]
         beyond = (q < limits.lower - 1e-9) | (q > limits.upper + 1e-9)
         fast = np.abs(qdot) > limits.velocity * (1.0 + 1e-9)
         count = {"position": int(beyond[on].sum()), "velocity": int(fast[on].sum()), "acceleration": 0}
         for run in self.runs:
             change = np.abs(np.diff(qdot[run], axis=0)) / self.dt
-            hard = change > limits.acceleration * (1.0 + 1e-6)
+            hard = change > acceleration[run][1:] * (1.0 + 1e-6)
             # The velocity before the limits were switched on is not bounded by them.
             count["acceleration"] += int(hard[on[run][1:] & on[run][:-1]].sum())
         return count

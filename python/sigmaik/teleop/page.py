@@ -191,7 +191,7 @@ class Page:
         with gui.add_folder("Rule"):
             method = gui.add_dropdown("method", (*((given,) if given else ()), *names), initial_value=given or family)
             self._bind(method, "method", str)
-            gamma = gui.add_slider("γ", 0.01, 0.5, 0.01, settings.gamma, hint="threshold on σ/σ₁")
+            gamma = gui.add_slider("γ", 0.01, 0.5, 0.01, settings.gamma, hint="J-PARSE: the largest threshold on σ/σ₁")
             self._bind(gamma, "gamma", lambda value: _number(value, 0.0, 1.0))
             for label, name, most in (
                 ("singular gain", "singular_gain", 5.0),
@@ -225,7 +225,7 @@ class Page:
         if self.session.assumed:
             gui.add_markdown(
                 f"Of {', '.join(self.session.assumed)} no acceleration limit is known: "
-                f"{self.session.acceleration:g} rad/s² is assumed."
+                f"{self.session.settings.assumed_acceleration:g} rad/s² is assumed."
             )
         if self._scene.robot.missing:
             gui.add_markdown(
@@ -381,7 +381,7 @@ class Page:
         rule = settings.rule()
         gamma = settings.gamma if hasattr(rule.method, "gamma") else None
         with self._server.atomic():
-            self._scene.draw(sample, settings.length_scale)
+            self._scene.draw(sample, session.length_scale)
             if session.goal is None:
                 self._scene.place_target(sample["pose"])
                 at = tuple(np.round(sample["pose"][:3, 3], 3).tolist())
@@ -394,7 +394,8 @@ class Page:
         singular: int | None = int(sample["singular"])
         if not len(sigma):  # the arm holds: no rule has run
             jacobian = session.chain.jacobian(sample["q"])
-            sigma, singular = task_singular_values(jacobian, sample["pose"][:3, :3], settings), None
+            rotation = sample["pose"][:3, :3]
+            sigma, singular = task_singular_values(jacobian, rotation, settings, session.length_scale), None
         title = methods.TITLES[rule.family]
         self._status.content = gauges.status_text(
             sample, session.chain, title, session.statistics, session.rate, replaying

@@ -42,12 +42,12 @@ def singular_lines(directions: Array, length_scale: float) -> tuple[Array, Array
     return long_linear, long_angular
 
 
-def task_singular_values(jacobian: Array, rotation: Array, settings: Settings) -> Array:
+def task_singular_values(jacobian: Array, rotation: Array, settings: Settings, length_scale: float) -> Array:
     """Singular values of the weighted task Jacobian, for samples that have none; `rotation` (3, 3): tip in base."""
     rows = jacobian.copy()
     if settings.frame == "tool":
         rows[:3], rows[3:] = rotation.T @ rows[:3], rotation.T @ rows[3:]
-    rows[3:] *= settings.length_scale
+    rows[3:] *= length_scale
     return np.asarray(np.linalg.svd(rows[list(settings.mask)], compute_uv=False), np.float64)
 
 

@@ -19,8 +19,6 @@ from .target import TargetPose
 __all__ = ["Session"]
 Samples = NDArray[np.void]
 
-#: [rad/s² or m/s²] Limit of joints without an acceleration limit: commands given by hand are never smooth.
-ACCELERATION = 10.0
 #: [cycles] The longest recording: ten minutes at 1 kHz, half a gigabyte.
 LONGEST_RECORDING = 600_000
 
@@ -41,7 +39,6 @@ class Session:
         settings: Settings | None = None,
         rate: float = 1000.0,
         start: ArrayLike | None = None,
-        acceleration: float = ACCELERATION,
         pose_timeout: float = 2.0,
         twist_timeout: float = 0.2,
         longest_recording: int = LONGEST_RECORDING,
@@ -50,7 +47,6 @@ class Session:
         robot: a shipped arm or a URDF file; base, tip: link names
         rate: [Hz] of the servo
         start: (n,) [rad or m], by default the arm's home
-        acceleration: [rad/s² or m/s²] limit of joints that have none
         pose_timeout, twist_timeout: [s] after which a command is stale
         longest_recording: [cycles], where a recording ends by itself
         ValueError where an argument is wrong, with the facts.
@@ -58,27 +54,21 @@ class Session:
         name, chain, home, self.source = sk.robots.open(robot, base, tip)
         if not 1.0 <= rate <= 20e3:
             raise ValueError(f"rate must be from 1 to 20000 Hz, not {rate:g}")
-        for what, value in (
-            ("acceleration", acceleration),
-            ("pose_timeout", pose_timeout),
-            ("twist_timeout", twist_timeout),
-        ):
+        for what, value in (("pose_timeout", pose_timeout), ("twist_timeout", twist_timeout)):
             if not 0.0 < value < math.inf:
                 raise ValueError(f"{what} must be above 0 and finite, not {value:g}")
-        known = chain.limits.acceleration
-        #: Names of the joints whose acceleration limit is assumed.
-        self.acceleration = acceleration
-        self.assumed = tuple(
-            joint for joint, limit in zip(chain.joint_names, known, strict=True) if not math.isfinite(limit)
-        )
+        known = np.isfinite(chain.limits.acceleration)
+        #: Names of the joints without an acceleration limit, for which the servo assumes one.
+        self.assumed = tuple(joint for joint, has in zip(chain.joint_names, known, strict=True) if not has)
         self.name = name
-        self.chain = chain.with_limits(acceleration=np.where(np.isfinite(known), known, acceleration))
+        self.chain = chain
         self.home: Array = home if start is None else np.array(start, dtype=np.float64)
         self.pose_timeout, self.twist_timeout = pose_timeout, twist_timeout
         self.longest_recording = longest_recording
         self._settings = settings or Settings()
         self._dt = 1.0 / rate
         servo = self._settings.servo(self.chain, self._dt, self.home)
+        self._length_scale = servo.length_scale
         servo.reset(self.home)
         self._loop = sk.ServoLoop(servo, history=_power_of_two(2.0 * rate))
         self._goal: Array | None = None
@@ -150,6 +140,12 @@ class Session:
             servo = settings.servo(self.chain, self._dt, self.home)
             self._history[self._loop.configure(servo)] = settings
             self._settings = settings
+            self._length_scale = servo.length_scale
+
+    @property
+    def length_scale(self) -> float:
+        """[m] 1 rad weighs as much as this length, as the servo has it."""
+        return self._length_scale
 
     # --- what happens
 

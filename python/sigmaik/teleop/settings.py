@@ -20,19 +20,20 @@ class Settings:
     """Rule, gains, limits and task of a `Session`'s servo. ValueError where a value is out of its range."""
 
     method: str = "jparse"  #: as for `sigmaik reach`: "jparse", "dls:damping=0.05"
-    gamma: float = 0.1  #: γ of J-PARSE and its ablations, threshold on σ_i/σ_max
+    gamma: float = 0.1  #: γ of J-PARSE (its largest threshold on σ_i/σ_max) and of its ablations
     singular_gain: float = 1.0  #: J-PARSE's gain in singular directions
     singular_posture: bool = True  #: whether the posture acts along J-PARSE's singular directions
-    gain_linear: float = 5.0  #: [1/s] position error to velocity
-    gain_angular: float = 5.0  #: [1/s] orientation error to angular velocity
-    max_linear_error: float = 0.08  #: [m] longer position errors are shortened to this length
-    max_angular_error: float = 0.4  #: [rad] longer orientation errors are shortened to this angle
+    gain_linear: float = 10.0  #: [1/s] position error to velocity
+    gain_angular: float = 10.0  #: [1/s] orientation error to angular velocity
+    max_linear_error: float | None = None  #: [m] longer position errors are shortened to this length; None: the servo's
+    max_angular_error: float = 1.0  #: [rad] longer orientation errors are shortened to this angle
     posture_gain: float = 0.5  #: [1/s] pull towards where the arm started
     limits: bool = True  #: hold all joint limits
+    assumed_acceleration: float = 10.0  #: [rad/s² or m/s²] limit of joints that have none; inf: they have none
     on_limit: Literal["redistribute", "scale"] = "redistribute"
     mask: tuple[bool, ...] = (True,) * 6  #: rows (vx, vy, vz, ωx, ωy, ωz) that matter
     frame: Literal["base", "tool"] = "base"  #: axes of the mask's rows
-    length_scale: float = 1.0  #: [m] 1 rad weighs as much as this length
+    length_scale: float | None = None  #: [m] 1 rad weighs as much as this length; None: the arm's own
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -40,9 +41,13 @@ class Settings:
             if isinstance(default, bool | str):
                 if not isinstance(value, type(default)):
                     raise ValueError(f"{field.name} must be a {type(default).__name__}, not {value!r}")
-            elif isinstance(default, float):
-                if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-                    raise ValueError(f"{field.name} must be a finite number, not {value!r}")
+            elif default is None or isinstance(default, float):
+                number = isinstance(value, int | float) and not isinstance(value, bool)
+                finite = number and (math.isfinite(value) or field.name == "assumed_acceleration")
+                if not finite and not (default is None and value is None):
+                    raise ValueError(
+                        f"{field.name} must be a finite number{' or None' if default is None else ''}, not {value!r}"
+                    )
             elif len(value) != 6 or not all(isinstance(row, bool) for row in value):
                 raise ValueError(f"{field.name} must be six truth values, not {value!r}")
         self.rule()
@@ -75,6 +80,7 @@ class Settings:
             velocity_limits=self.limits,
             acceleration_limits=self.limits,
             jerk_limits=self.limits,
+            assumed_acceleration=self.assumed_acceleration,
             on_limit=self.on_limit,
             length_scale=self.length_scale,
             mask=self.mask,

@@ -9,6 +9,7 @@ Units: m, rad, s; for prismatic joints m in place of rad.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -46,7 +47,7 @@ MISSED = 1e-3
 
 @dataclass(frozen=True)
 class LimitsExperiment:
-    """An arm, a rule, and the trials of each scenario."""
+    """An arm, a rule, and the trials of each scenario. The settings have the arm's length scale and largest error."""
 
     robot: str
     chain: sk.Chain
@@ -120,6 +121,10 @@ def load_limits(
 ) -> LimitsExperiment:
     """The experiment with a shipped arm, or a URDF file. ValueError where a part is wrong."""
     settings = settings or LimitsSettings()
+    label, chain, home, _ = sk.robots.open(robot, base, tip)
+    length_scale = chain.characteristic_length if settings.length_scale is None else settings.length_scale
+    longest = 0.5 * length_scale if settings.max_linear_error is None else settings.max_linear_error
+    settings = dataclasses.replace(settings, length_scale=length_scale, max_linear_error=longest)
     for name in (
         "rate",
         "seconds",
@@ -128,13 +133,13 @@ def load_limits(
         "gain_angular",
         "max_linear_error",
         "max_angular_error",
+        "length_scale",
     ):
         value = getattr(settings, name)
         if not 0.0 < value < math.inf:
             raise ValueError(f"{name} must be positive and finite, not {value:g}")
     if settings.trials < 1 or settings.seed < 0:
         raise ValueError("trials must be positive, and seed not negative")
-    label, chain, home, _ = sk.robots.open(robot, base, tip)
     for name, limit in (("acceleration", settings.acceleration), ("jerk", settings.jerk)):
         if limit is not None:
             if not limit > 0.0:
@@ -179,6 +184,7 @@ def _served(experiment: LimitsExperiment, trial: Trial, variant: str, progress: 
         gain_angular=s.gain_angular,
         max_linear_error=s.max_linear_error,
         max_angular_error=s.max_angular_error,
+        length_scale=s.length_scale,
         soft_start=s.soft_start,
         position_limits=on,
         velocity_limits=on,
@@ -209,7 +215,7 @@ def _clamped(experiment: LimitsExperiment, trial: Trial, _: str, progress: Calla
     chain, dt = experiment.chain, 1.0 / experiment.settings.rate
     limits = chain.limits
     lower, upper, speed = limits.lower, limits.upper, limits.velocity
-    solver = sk.VelocitySolver(experiment.method.method)
+    solver = sk.VelocitySolver(experiment.method.method, _length_scale(experiment))
     q, qdot, error, held = _empty(experiment, trial)
     for k, command in enumerate(trial.commands):
         here = q[k]
@@ -240,7 +246,7 @@ def _twists(settings: LimitsSettings, error: Array, first: int = 0) -> Array:
     """Twists (N, 6) of pose errors (N, 6), as the Servo has them, from cycle `first` on."""
     twist = error.copy()
     for rows, longest, gain in (
-        (slice(0, 3), settings.max_linear_error, settings.gain_linear),
+        (slice(0, 3), settings.max_linear_error or math.inf, settings.gain_linear),
         (slice(3, 6), settings.max_angular_error, settings.gain_angular),
     ):
         length = np.linalg.norm(twist[:, rows], axis=1, keepdims=True)
@@ -251,12 +257,19 @@ def _twists(settings: LimitsSettings, error: Array, first: int = 0) -> Array:
     return twist
 
 
+def _length_scale(experiment: LimitsExperiment) -> float:
+    scale = experiment.settings.length_scale
+    return experiment.chain.characteristic_length if scale is None else scale
+
+
 def _rule(experiment: LimitsExperiment, trial: Trial, q: Array, error: Array) -> Array:
     commands = _twists(experiment.settings, error) if trial.by_pose else trial.commands
     twists = np.empty((len(q), 6))
     for part in parts(len(q)):
         jacobian = experiment.chain.jacobian(q[part])
-        qdot = sk.solve_batch(experiment.method.method, jacobian, commands[part])
+        qdot = sk.solve_batch(
+            experiment.method.method, jacobian, commands[part], length_scale=_length_scale(experiment)
+        )
         twists[part] = np.einsum("bij,bj->bi", jacobian, qdot)
     return twists
 

@@ -29,10 +29,12 @@ class LimitsSettings:
     seconds: float = 60.0  #: of teleoperation
     pace: float = 1.0  #: factor on the times of the other scenarios
     seed: int = 0
-    gain_linear: float = 5.0  #: [1/s] position error to velocity
-    gain_angular: float = 5.0  #: [1/s] orientation error to angular velocity
-    max_linear_error: float = 0.25  #: [m] longer errors are shortened to this length
+    gain_linear: float = 10.0  #: [1/s] position error to velocity
+    gain_angular: float = 10.0  #: [1/s] orientation error to angular velocity
+    max_linear_error: float | None = None  #: [m] longer errors are shortened to this length; None: the servo's
     max_angular_error: float = 1.0  #: [rad]
+    #: [m] 1 rad weighs as much as this length, for the rule with limits and without; None: the arm's own.
+    length_scale: float | None = None
     soft_start: float = 0.1  #: [s]
     acceleration: float | None = None  #: limit of all joints; None: the arm's own
     jerk: float | None = None  #: limit of all joints; None: the arm's own

@@ -23,6 +23,7 @@ class ReachSettings:
     max_orientation_error: float = math.pi  #: cap on e_o [rad]; π is none
     gamma: float = 0.1  #: γ, threshold on σ_i/σ_max of J-PARSE and its ablations
     singular_gain: float = 1.0  #: J-PARSE's gain in singular directions, position and orientation
+    adaptive: bool = False  #: whether J-PARSE's threshold grows with the command; the paper's threshold is fixed
     singular_posture: bool = False  #: whether the posture acts along J-PARSE's singular directions
     start: tuple[float, ...] | None = None  #: (n,) [rad] where the arm starts; None: its home
     posture: tuple[float, ...] | None = None  #: q_nominal (n,) [rad]; None: where the arm starts

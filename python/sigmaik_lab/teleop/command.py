@@ -8,7 +8,6 @@ import webbrowser
 
 from sigmaik._extras import need
 from sigmaik.teleop.devices import DEVICES
-from sigmaik.teleop.session import ACCELERATION
 from sigmaik_lab.options import add_arm
 from sigmaik_lab.output import say
 from sigmaik_lab.runner import parsed, run_study
@@ -22,16 +21,16 @@ def options(parser: argparse.ArgumentParser) -> None:
     arm.add_argument(
         "--acceleration",
         type=float,
-        default=ACCELERATION,
+        default=10.0,
         metavar="RAD/S²",
-        help="limit of joints that have none (%(default)g)",
+        help="assumed limit of joints that have none (%(default)g)",
     )
     loop = parser.add_argument_group("the servo")
     loop.add_argument("--rate", type=float, default=1000.0, metavar="HZ", help="(%(default)g)")
     loop.add_argument("--method", default="jparse", metavar="NAME[:PARAMETER=VALUE,…]", help="(%(default)s)")
     loop.add_argument("--gamma", type=float, default=0.1, metavar="Γ", help="threshold on σ/σ_max (%(default)g)")
     loop.add_argument(
-        "--length-scale", type=float, default=1.0, metavar="M", help="1 rad weighs as much as this length (%(default)g)"
+        "--length-scale", type=float, metavar="M", help="1 rad weighs as much as this length (the arm's own)"
     )
     page = parser.add_argument_group("the page")
     page.add_argument(
@@ -72,7 +71,12 @@ def run(args: argparse.Namespace) -> int:
         raise ValueError(f"--port must be from 0 to 65535, not {args.port}")
     if args.seconds is not None and not 0.0 < args.seconds < 1e9:
         raise ValueError(f"--for must be above 0, not {args.seconds:g}")
-    settings = Settings(method=args.method, gamma=args.gamma, length_scale=args.length_scale)
+    settings = Settings(
+        method=args.method,
+        gamma=args.gamma,
+        length_scale=args.length_scale,
+        assumed_acceleration=args.acceleration,
+    )
     replay = None if args.replay is None else Episode.load(args.replay)
     session = Session(
         args.robot,
@@ -80,7 +84,6 @@ def run(args: argparse.Namespace) -> int:
         tip=args.tip,
         settings=settings,
         rate=args.rate,
-        acceleration=args.acceleration,
         pose_timeout=args.browser_timeout,
     )
     with session:

@@ -23,7 +23,7 @@ from sigmaik._types import Array
 from sigmaik.methods import NamedMethod
 
 from .camera import Camera, Frame, see
-from .target import TARGETS, play, reachable_poses, read_recording, scripted
+from .target import TARGETS, asked_speed, play, reachable_poses, read_recording, scripted
 
 __all__ = [
     "MODES",
@@ -58,10 +58,12 @@ class TrackSettings:
     """Rate, gains and duration of the loop, filters of the stream, and limits that replace those of the arm."""
 
     rate: float = 1000.0  #: [Hz]
-    duration: float = 20.0  #: [s]; of a recording, all of it
+    duration: float = 20.0  #: [s] of a target of pace 1; of a recording, all of it
+    #: Speed of a target that is not recorded, as a part of the hand's own; None: 1, or less where the arm is too slow.
+    pace: float | None = None
     seed: int = 0
-    gain_linear: float = 5.0  #: [1/s]
-    gain_angular: float = 5.0  #: [1/s]
+    gain_linear: float = 10.0  #: [1/s]
+    gain_angular: float = 10.0  #: [1/s]
     posture_gain: float = 0.0  #: [1/s] towards home, where the arm is redundant
     smoothing: float = 0.05  #: [s] of the stream
     latency: float | None = None  #: [s] of "interpolate"; None: the camera's delay, and two pictures and a half
@@ -86,6 +88,8 @@ class TrackExperiment:
     reachable: Bools  #: (N,)
     gap: tuple[float, float]  #: [s] from, to: no samples; both the duration where there is none
     frames: tuple[Frame, ...]
+    pace: float  #: of the target; 1 for a recording
+    asked_speed: float  #: part of the joints' velocity limits that the target asks for within reach, at the most
 
     @property
     def t(self) -> Array:
@@ -184,7 +188,7 @@ def load_track(
     ValueError where a part is wrong.
     """
     s, camera = settings or TrackSettings(), camera or Camera()
-    for name in ("rate", "duration", "gain_linear", "gain_angular"):
+    for name in ("rate", "duration", "gain_linear", "gain_angular", *(("pace",) if s.pace is not None else ())):
         if not 0.0 < getattr(s, name) < math.inf:
             raise ValueError(f"{name} must be positive and finite, not {getattr(s, name):g}")
     for name in ("rate", "noise", "rotation_noise", "delay"):
@@ -204,11 +208,19 @@ def load_track(
         limit = np.where(np.isfinite(limit), limit, spare) if own is None else np.full(chain.dof, own)
         chain = chain.with_limits(**{name: limit})
 
+    pace, asked = 1.0, None
     if target in TARGETS:
         if s.duration < 4.0:
             raise ValueError(f"duration must be at least 4 s, not {s.duration:g}")
-        t = np.arange(round(s.duration * s.rate) + 1) / s.rate
-        poses = scripted(target, chain, home, t, s.seed)
+        if s.pace is not None:
+            pace = s.pace
+        else:
+            t = np.arange(round(s.duration * 100.0) + 1) / 100.0
+            poses = scripted(target, chain, home, t, s.seed)
+            asked = asked_speed(chain, home, poses, reachable_poses(chain, home, poses, 100.0), 100.0)
+            pace = 1.0 if asked <= 1.0 else 1.0 / asked
+        t = np.arange(round(s.duration / pace * s.rate) + 1) / s.rate
+        poses = scripted(target, chain, home, t * pace, s.seed)
     elif pathlib.Path(target).is_file():
         times, recorded = read_recording(target)
         t = np.arange(math.floor((times[-1] - times[0]) * s.rate + 1e-9) + 1) / s.rate
@@ -225,8 +237,12 @@ def load_track(
     if camera.gap is not None:
         gap = (camera.gap[0] * end, min(end, camera.gap[0] * end + camera.gap[1]))
     reachable = reachable_poses(chain, home, poses, s.rate)
+    if asked is None:
+        asked = asked_speed(chain, home, poses, reachable, s.rate)
+    else:
+        asked *= pace
     frames = tuple(see(poses, s.rate, s.seed, camera, gap))
-    return TrackExperiment(label, target, chain, home, s, camera, poses, twists, reachable, gap, frames)
+    return TrackExperiment(label, target, chain, home, s, camera, poses, twists, reachable, gap, frames, pace, asked)
 
 
 def follow(e: TrackExperiment, variant: Variant, progress: Callable[[int], None] | None = None) -> Follow:

@@ -39,7 +39,8 @@ _CAMERA = (
 )
 _SETTINGS = (
     ("--rate", "rate", "HZ", "control rate"),
-    ("--duration", "duration", "S", "of a target that is not recorded"),
+    ("--duration", "duration", "S", "of a target that is not recorded, at its own pace"),
+    ("--pace", "pace", "PART", "of the speed of a target that is not recorded; by default 1, or what the arm can do"),
     ("--gain-linear", "gain_linear", "1/S", "position error to velocity"),
     ("--gain-angular", "gain_angular", "1/S", "orientation error to angular velocity"),
     ("--smoothing", "smoothing", "S", "of the stream"),
@@ -116,7 +117,7 @@ def load(args: argparse.Namespace) -> Iterable[Tracking]:
         camera = dataclasses.replace(camera, gap=None)
     settings = TrackSettings(seed=args.seed, **{name: given[f"track_{name}_loop"] for _, name, _, _ in _SETTINGS})
     modes = choices("mode", args.mode, MODES)
-    methods = parse_methods(args.method or ["all"], ReachSettings(rate=settings.rate))
+    methods = parse_methods(args.method or ["all"], ReachSettings(rate=settings.rate, adaptive=True))
     experiment = load_track(args.robot, args.target, settings, camera, args.base, args.tip)
     wanted = {"on": [True], "off": [False], "both": [True, False]}[args.feedforward]
 

@@ -40,6 +40,7 @@ class TrackSummary:
     joint_jerk_rms: float  #: [rad/s³]
     joint_jerk_max: float
     broken: int  #: limits, joints times cycles
+    asked_speed: float  #: part of the joints' velocity limits that the target asks for within reach
     speed: float  #: the largest part of a joint's limit
     acceleration: float
     jerk: float
@@ -81,6 +82,7 @@ def summarize_track(run: Follow, without: Follow | None = None) -> TrackSummary:
         joint_jerk_rms=float(np.sqrt(np.mean(run.jerk**2))),
         joint_jerk_max=float(np.abs(run.jerk).max()),
         broken=broken,
+        asked_speed=e.asked_speed,
         speed=float(ratios[0].max()),
         acceleration=float(ratios[1].max()),
         jerk=float(ratios[2].max()),

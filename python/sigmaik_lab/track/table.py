@@ -23,6 +23,7 @@ def headline(e: TrackExperiment) -> str:
     return (
         f"{e.robot}, {e.target}: {len(e.poses) / s.rate:g} s at {s.rate:g} Hz, {100 * away:.0f} % of it out of reach, "
         f"seed {s.seed}\n"
+        f"at {100 * e.pace:.0f} % of its pace the target asks for {100 * e.asked_speed:.0f} % of the joints' speed\n"
         f"camera: {c.rate:g} Hz, {1e3 * c.delay:g} ms late, noise {1e3 * c.noise:g} mm and "
         f"{1e3 * c.rotation_noise:g} mrad at {1e3 * c.offset:g} mm,\n"
         f"{100 * c.dropout:g} % missing, {100 * c.outliers:g} % wrong{gap}; fed: the target's twist is fed forward"
@@ -56,15 +57,20 @@ def error_table(rows: Sequence[TrackSummary], by: By) -> Table:
 
 
 def motion_table(rows: Sequence[TrackSummary], by: By) -> Table:
-    """Jerk of tip and joints, broken limits, and the distance from the limits. Red: broken limits."""
+    """Jerk of tip and joints, broken limits, the speed that the target asks for, and the largest parts of the limits.
+
+    Red: broken limits.
+    """
     table = _table(f"{_title(rows, by)}: jerk [m/s³, rad/s³], limits [%, rad]")
-    table.add_numbers("tip\nrms", "\nmax", "joint\nrms", "\nmax", "bro-\nken", "speed\n", "acc.\n", "jerk\n", "room\n")
+    table.add_numbers(
+        "tip\nrms", "\nmax", "joint\nrms", "\nmax", "bro-\nken", "asked\n", "speed\n", "acc.\n", "jerk\n", "room\n"
+    )
     for row in rows:
         table.add_row(
             _name(row, by),
             *(f"{x:.0f}" for x in (row.tip_jerk_rms, row.tip_jerk_max, row.joint_jerk_rms, row.joint_jerk_max)),
             red(str(row.broken), row.broken > 0),
-            *(_number(100.0 * x, 0) for x in (row.speed, row.acceleration, row.jerk)),
+            *(_number(100.0 * x, 0) for x in (row.asked_speed, row.speed, row.acceleration, row.jerk)),
             f"{row.margin:.2f}",
         )
     return table

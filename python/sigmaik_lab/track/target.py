@@ -14,7 +14,7 @@ import sigmaik as sk
 from sigmaik._types import Array
 from sigmaik_lab.reach.paths import make_pose, rotation_rpy
 
-__all__ = ["TARGETS", "play", "reachable_poses", "read_recording", "scripted"]
+__all__ = ["TARGETS", "asked_speed", "play", "reachable_poses", "read_recording", "scripted"]
 
 #: Scripted targets. Every target begins and ends at the arm's home, and at rest.
 TARGETS: dict[str, str] = {
@@ -27,6 +27,7 @@ TARGETS: dict[str, str] = {
 BEYOND = 0.15  #: [m] out of reach
 #: A pose is within reach where a servo without speed limits comes this close to the pose [m, rad].
 NEAR = (2e-3, 1e-2)
+STRIDE = 0.02  #: [s] between the poses that are tested
 
 
 def scripted(target: str, chain: sk.Chain, home: Array, t: Array, seed: int) -> Array:
@@ -140,7 +141,8 @@ def play(times: Array, poses: Array, t: Array) -> Array:
 def _reach_test(chain: sk.Chain, home: Array) -> Callable[[Array], bool]:
     """A test whether a servo with position limits alone, and with time to settle, reaches a pose from home."""
     servo = sk.Servo(
-        chain, sk.JParse(gamma=0.02), dt=0.05, gain_linear=10.0, gain_angular=10.0, soft_start=0.0,
+        chain, sk.JParse(gamma=0.02, adaptive=False), dt=0.05, gain_linear=10.0, gain_angular=10.0,
+        max_linear_error=0.25, length_scale=1.0, soft_start=0.0,
         velocity_limits=False, acceleration_limits=False, jerk_limits=False,
     )  # fmt: skip
 
@@ -158,8 +160,31 @@ def _reach_test(chain: sk.Chain, home: Array) -> Callable[[Array], bool]:
 def reachable_poses(chain: sk.Chain, home: Array, poses: Array, rate: float) -> NDArray[np.bool_]:
     """(N,) which of the poses (N, 4, 4) an arm reaches from home, tested every 20 ms."""
     reaches = _reach_test(chain, home)
-    stride = max(1, round(0.02 * rate))
+    stride = max(1, round(STRIDE * rate))
     return np.repeat([reaches(pose) for pose in poses[::stride]], stride)[: len(poses)]
+
+
+def asked_speed(chain: sk.Chain, home: Array, poses: Array, reachable: NDArray[np.bool_], rate: float) -> float:
+    """How fast the target's poses (N, 4, 4) ask the joints to be, as a part of the joints' velocity limits.
+
+    An arm without velocity, acceleration and jerk limits follows the target from home. Where the target is within reach
+    and the tip is at the target, J-PARSE (γ = 0.1, not adaptive) maps the target's twist to joint velocities. The
+    answer is the largest of these velocities. The answer is 0 where no joint has a velocity limit.
+    """
+    stride = max(1, round(STRIDE * rate))
+    dt, way = stride / rate, poses[::stride]
+    servo = sk.Servo(chain, dt=dt, soft_start=0.0, velocity_limits=False, acceleration_limits=False, jerk_limits=False)
+    solver = sk.VelocitySolver(sk.JParse(adaptive=False), servo.length_scale)
+    servo.reset(home)
+    largest = 0.0
+    for here, there, within in zip(way[:-1], way[1:], reachable[::stride][:-1], strict=True):
+        twist = sk.pose_error(here, there) / dt
+        jacobian = chain.jacobian(servo.q)
+        error = servo.update(here, twist).pose_error
+        if within and np.linalg.norm(error[:3]) < 5.0 * NEAR[0] and np.linalg.norm(error[3:]) < 5.0 * NEAR[1]:
+            speed = np.abs(solver.solve(jacobian, twist).qdot)
+            largest = max(largest, float(np.max(speed / chain.limits.velocity)))
+    return largest
 
 
 def _excursion(chain: sk.Chain, home: Array, outward: Array) -> float:

@@ -1,0 +1,44 @@
+"""Arrivals of a servo, as numbers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .experiment import Arrivals
+
+__all__ = ["ArrivalSummary", "summarize_arrivals"]
+
+
+@dataclass(frozen=True)
+class ArrivalSummary:
+    """A servo and an arm, all trials together."""
+
+    robot: str
+    targets: str
+    servo: str
+    trials: int
+    arrived: float  #: share of trials in which the tip arrived and stayed
+    median_time: float  #: [s] in which half of all trials had arrived; inf: fewer arrived
+    time_90: float  #: [s] the same for 90 % of all trials
+    at_rest: float  #: share of trials at whose end all joints rest
+    end_speed: float  #: [rad/s or m/s] the fastest joint at the end of any trial
+    excess: float  #: the largest excess over any limit, a part of the limit, or rad or m; 0: every limit was held
+
+
+def summarize_arrivals(robot: str, targets: str, servo: str, done: Arrivals) -> ArrivalSummary:
+    times = np.sort(done.time)
+    n = len(times)
+    return ArrivalSummary(
+        robot=robot,
+        targets=targets,
+        servo=servo,
+        trials=n,
+        arrived=float(np.isfinite(times).mean()),
+        median_time=float(times[(n - 1) // 2]),
+        time_90=float(times[min(n - 1, int(np.ceil(0.9 * n)) - 1)]),
+        at_rest=float(done.rest.mean()),
+        end_speed=float(done.speed.max()),
+        excess=float(done.excess.max()),
+    )
