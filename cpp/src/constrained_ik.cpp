@@ -1,3 +1,5 @@
+// One cycle of ConstrainedIk: the rows of the problem, its linearisations, and what is reported.
+
 #include <sigmaik/constrained_ik.hpp>
 
 #include <algorithm>
@@ -6,7 +8,7 @@
 
 #include <sigmaik/pose.hpp>
 
-#include "length.hpp"
+#include "constrained_ik_parts.hpp"
 #include "message.hpp"
 #include "numbers.hpp"
 
@@ -15,24 +17,15 @@ namespace {
 
 using detail::kInfinity;
 using detail::require;
-constexpr double kMet = 1e-9;    // [m, rad] a smaller error counts as none
-constexpr double kAgree = 0.01;  // velocities that differ by less than this part of a joint's bounds are the same
+using detail::constrained::kMet;
+constexpr double kStuck = 1.0 - 1e-6;  // ϑ of an arm that stands
+constexpr double kAgree = 0.01;        // velocities that differ by less than this part of a joint's bounds are the same
 
 // The rows of the task that are met exactly, or the others.
 Task part(const ConstrainedIkOptions& options, bool exact) {
   Task out = options.task;
   for (std::size_t i = 0; i < 6; ++i) out.mask[i] = options.task.mask[i] && options.exact[i] == exact;
   return out;
-}
-
-// J_l⁻¹(φ), which takes ω to φ̇ for φ = log(R): I − ½[φ]× + c [φ]×².
-Eigen::Matrix3d inverse_left_jacobian(const Eigen::Vector3d& phi) noexcept {
-  const double angle = detail::length(phi);
-  Eigen::Matrix3d cross;
-  cross << 0.0, -phi.z(), phi.y(), phi.z(), 0.0, -phi.x(), -phi.y(), phi.x(), 0.0;
-  const double half = 0.5 * angle;
-  const double c = angle < 1e-4 ? 1.0 / 12.0 : (1.0 - half / std::tan(half)) / (angle * angle);
-  return Eigen::Matrix3d::Identity() - 0.5 * cross + c * cross * cross;
 }
 
 // Whether the closed form asks for the velocity that was optimised. Where the two differ, an error still decays by β.
@@ -94,9 +87,16 @@ ConstrainedIk::ConstrainedIk(Chain chain, const ConstrainedIkOptions& options)
 void ConstrainedIk::reset(const JointRef& q, const JointRef& qdot) {
   tracker_.reset(q, qdot);
   least_squares_.reset();
+  closing_.reset();
   sigmaik::update(chain_, tracker_.q(), state_);
   reference_ = state_.tip;
   last_free_ = true;
+  preview_.count = 0;
+  turn_.resize(0);
+  stuck_ = false;
+  last_motion_.setZero();
+  last_way_ = 0.0;
+  end_arrival();
 }
 
 ConstrainedIkStep ConstrainedIk::update(const Pose& target) noexcept {
@@ -108,8 +108,17 @@ ConstrainedIkStep ConstrainedIk::update(const Pose& target) noexcept {
   const bool good = is_pose(target.matrix());
   if (!good) {
     step.qdot = tracker_.stop();
-  } else if (!try_analytic(target, step)) {
-    optimise(target, pose_error(reference_, target), step);
+  } else {
+    const Twist motion = pose_error(reference_, target);
+    if (!turn(motion, step)) {
+      const double least = look_ahead(motion);
+      if (least > 0.0 || !try_analytic(target, step)) optimise(target, motion, least, step);
+    }
+    if (step.used == IkSource::Analytic) end_arrival();
+    last_motion_ = motion;
+    last_way_ = (1.0 - step.time_scale) * motion.norm();
+    stuck_ = step.time_scale > kStuck && motion.norm() > kMet;
+    preview_.way += last_way_;
   }
   const bool held = step.active != 0 || step.torque_active || step.error_active || !step.exact_met;
   last_free_ = step.used == IkSource::Analytic ||
@@ -192,24 +201,9 @@ void ConstrainedIk::prepare() noexcept {
   if (dynamics_) prepare_torques();
 }
 
-// (11), (12): e ≈ slope Δq + offset, the tip minus the target; and e* = e + turned ϑ.
-struct ConstrainedIk::Linearisation {
-  Jacobian slope;
-  Twist offset, turned;
-
-  // `state` belongs to the joint positions of this linearisation; `back` is the step from there to the start of the
-  // cycle.
-  Linearisation(const ChainState& state, const Pose& target, const Twist& motion, const JointVector& back) noexcept
-      : slope(state.jacobian), offset(-pose_error(state.tip, target)), turned(motion) {
-    const Eigen::Matrix3d turn = inverse_left_jacobian(offset.tail<3>());
-    slope.bottomRows<3>() = turn.lazyProduct(state.jacobian.bottomRows<3>());
-    turned.tail<3>() = turn * motion.tail<3>();
-    for (Eigen::Index j = 0; j < back.size(); ++j) offset += back[j] * slope.col(j);
-  }
-};
-
 // (24), (25) with the weights α and β, and |e| ≤ max_error.
-void ConstrainedIk::set_approximate_rows(const Linearisation& at, const Twist& motion) noexcept {
+void ConstrainedIk::set_approximate_rows(const Linearisation& at, const Twist& motion,
+                                         const Closing& closing) noexcept {
   const int n = chain_.dof(), ap = approximate_.rows();
   if (ap == 0) return;
   const bool scaled = options_.gamma.has_value();
@@ -219,6 +213,8 @@ void ConstrainedIk::set_approximate_rows(const Linearisation& at, const Twist& m
   const TaskVector offset = select_rows(approximate_, rotation, at.offset);
   const TaskVector slowed = select_rows(approximate_, rotation, at.turned);
   const TaskVector asked = select_rows(approximate_, rotation, motion);
+  const TaskVector behind = select_rows(approximate_, rotation, closing.behind);
+  const TaskVector change = select_rows(approximate_, rotation, closing.approximate);
   auto& p = problem_;
   int k = 0, bound = torque_rows_;
   for (std::size_t i = 0; i < 6; ++i) {
@@ -227,6 +223,10 @@ void ConstrainedIk::set_approximate_rows(const Linearisation& at, const Twist& m
     const double alpha = options_.alpha[row], beta = options_.beta[row], most = options_.max_error[row];
     p.A.row(k).head(n) = alpha * rows.row(k);
     p.b[k] = -alpha * offset[k];
+    // The part of the error that stays: without limits the rest of the error changes by −α²/(α²+β²) of itself.
+    if (closing.active && alpha > 0.0) {
+      p.b[k] += alpha * behind[k] + (alpha * alpha + beta * beta) / alpha * change[k];
+    }
     p.A.row(ap + k).head(n) = beta * rate.row(k);
     p.b[ap + k] = beta * asked[k];
     if (scaled) p.A(k, n) = alpha * slowed[k];
@@ -234,36 +234,56 @@ void ConstrainedIk::set_approximate_rows(const Linearisation& at, const Twist& m
       for (const double sign : {1.0, -1.0}) {
         p.G.row(bound).head(n) = sign / most * rows.row(k);
         if (scaled) p.G(bound, n) = sign / most * slowed[k];
-        p.h[bound++] = 1.0 - sign / most * offset[k];
+        // A larger error that is behind comes back no faster than the joints can brake.
+        const double stays = sign / most * (behind[k] + change[k]);
+        p.h[bound++] = std::max(1.0, stays) - sign / most * offset[k];
       }
     }
     ++k;
   }
 }
 
-// (26): e* = 0.
-void ConstrainedIk::set_exact_rows(const Linearisation& at) noexcept {
+// (26): e* = 0, or what of the error stays.
+void ConstrainedIk::set_exact_rows(const Linearisation& at, const Closing& closing) noexcept {
   if (exact_.rows() == 0) return;
   const int n = chain_.dof();
   const Eigen::Matrix3d& rotation = state_.tip.linear();
   problem_.C.leftCols(n) = select_rows(exact_, rotation, at.slope);
-  problem_.d = -select_rows(exact_, rotation, at.offset);
+  problem_.d = select_rows(exact_, rotation, Twist(closing.behind + closing.exact - at.offset));
   if (options_.gamma) problem_.C.col(n) = select_rows(exact_, rotation, at.turned);
 }
 
-void ConstrainedIk::optimise(const Pose& target, const Twist& motion, ConstrainedIkStep& step) noexcept {
+void ConstrainedIk::optimise(const Pose& target, const Twist& motion, double least, ConstrainedIkStep& step) noexcept {
   step.used = IkSource::Optimised;
-  prepare();
+  if (!arriving_ && jumps(motion)) arriving_ = true;
+  if (!optimise_once(target, motion, least, step)) {
+    arriving_ = true;
+    optimise_once(target, motion, least, step);
+  }
+}
+
+// Returns whether the answer stands: an exact part that cannot be met has to be approached as in constrained_ik.hpp.
+bool ConstrainedIk::optimise_once(const Pose& target, const Twist& motion, double least,
+                                  ConstrainedIkStep& step) noexcept {
+  const ChainState start = state_;
+  Closing closing;
+  if (arriving_) closing = close(motion.cwiseAbs().maxCoeff() <= kMet);
   const int n = chain_.dof();
+  prepare();
+  if (options_.gamma) problem_.lower[n] = least;
   const JointVector& from = tracker_.q();
-  JointVector q = from;
   LeastSquaresSolution solution;
   bool error_lost = false;
-  for (int iteration = 0; iteration < options_.iterations; ++iteration) {
+  // Where something is behind, close() has solved a problem at `from`; going on with q̇ is as good a start as its
+  // answer.
+  const bool ahead = closing.active && options_.iterations > 1;
+  JointVector q = from;
+  if (ahead) q += options_.dt * tracker_.qdot();
+  for (int iteration = ahead ? 1 : 0; iteration < options_.iterations; ++iteration) {
     if (iteration > 0) sigmaik::update(chain_, q, state_);
     const Linearisation at(state_, target, motion, from - q);
-    set_approximate_rows(at, motion);
-    set_exact_rows(at);
+    set_approximate_rows(at, motion, closing);
+    set_exact_rows(at, closing);
     solution = least_squares_.solve(problem_);
     error_lost = error_rows_ > 0 && solution.equality_error > kMet;
     if (error_lost) {  // the exact part comes first
@@ -272,7 +292,23 @@ void ConstrainedIk::optimise(const Pose& target, const Twist& motion, Constraine
     }
     q = from + solution.x.head(n);
   }
+  if (!arriving_ && brakes() && solution.equality_error > kMet) {
+    state_ = start;
+    return false;
+  }
   report(solution, error_lost, step);
+  if (solution.status == LeastSquaresStatus::BadInput || !arriving_) return true;
+  const double lost = missed(solution);
+  if (closing.active) {
+    const Eigen::Matrix3d& rotation = start.tip.linear();
+    const TaskVector stays = select_rows(exact_, rotation, Twist(closing.behind + closing.exact));
+    for (int k = 0; k < exact_.rows(); ++k) step.exact_met = step.exact_met && std::abs(stays[k]) <= kMet;
+    step.error_active = step.error_active || exceeds(rotation, closing);
+  }
+  state_ = start;
+  settle(closing, motion, lost, step);
+  if (closing.small && step.active == 0 && !step.torque_active && solution.equality_error <= kMet) end_arrival();
+  return true;
 }
 
 // Fills in the fields that the last solution decides.

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <map>
 #include <string>
+#include <vector>
 
 #include <sigmaik/constrained_ik.hpp>
 #include <sigmaik/error.hpp>
@@ -417,6 +418,252 @@ TEST_CASE("closed form while it is inside the limits, optimised where it is not,
   CHECK(switches < 40);
   CHECK(last == IkSource::Analytic);
   CHECK_FALSE(ConstrainedIk(arm("ur10")).has_analytic());
+}
+
+namespace {
+
+// A configuration with much room on all sides.
+struct Home {
+  const char* name;
+  std::vector<double> q;
+};
+const std::vector<Home> kHomes{{"ufactory_xarm7", {0.0, -0.5, 0.0, 1.0, 0.0, 1.2, 0.0}},
+                               {"franka_panda", {0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785}},
+                               {"kinova_gen3_7dof", {0.0, 0.5, 0.0, 1.0, 0.0, 1.2, 0.0}},
+                               {"kuka_kr6_r900", {0.0, -1.3, 1.5, 0.3, 0.5, 0.0}},
+                               {"ur10", {0.3, -1.2, 1.5, -1.0, -1.5, 0.3}}};
+
+JointVector at_home(const Home& home) {
+  return Eigen::Map<const JointVector>(home.q.data(), static_cast<Eigen::Index>(home.q.size()));
+}
+
+ConstrainedIkOptions every(double dt) {
+  ConstrainedIkOptions o;
+  o.dt = dt;
+  o.beta.setConstant(5.0 * std::sqrt(1e-3 / dt));
+  return o;
+}
+
+// The largest part of its velocity limit that a joint uses.
+double speed(const Chain& chain, const JointVector& qdot) {
+  double most = 0.0;
+  for (int i = 0; i < chain.dof(); ++i) {
+    const double limit = chain.limits().velocity[i];
+    most = std::max(most, std::abs(qdot[i]) / (limit < kInfinity ? limit : 1.0));
+  }
+  return most;
+}
+
+// Seconds after which the arm is at a resting target and at rest, and stays so.
+double settling_time(const Chain& chain, const ConstrainedIkOptions& o, const JointVector& q, const Twist& by,
+                     double seconds) {
+  ConstrainedIk ik(chain, o);
+  ik.reset(q);
+  const Pose target = moved(ik.tip(), by);
+  double last = 0.0;
+  ConstrainedIkStep step;
+  for (double t = o.dt; t < seconds; t += o.dt) {
+    step = ik.step(target);
+    const bool there = step.error.head<3>().norm() <= 1e-4 && step.error.tail<3>().norm() <= 1e-3;
+    if (!there || speed(chain, step.qdot) >= 1e-3) last = t;
+  }
+  CHECK(step.status == Status::Ok);
+  CHECK(step.qdot.cwiseAbs().maxCoeff() < 1e-9);
+  return last;
+}
+
+}  // namespace
+
+TEST_CASE("after a step of the target the arm comes to rest there, for any arm, axis, size and cycle") {
+  for (const Home& home : kHomes) {
+    const Chain chain = arm(home.name);
+    for (const double dt : {1e-3, 4e-3}) {
+      for (int axis = 0; axis < 6; ++axis) {
+        for (const double size : {-0.1, -0.03, -0.01, 0.01, 0.06}) {
+          CAPTURE(std::string(home.name));
+          CAPTURE(dt);
+          CAPTURE(axis);
+          CAPTURE(size);
+          Twist by = Twist::Zero();
+          by[axis] = size * (axis < 3 ? 1.0 : 3.0);
+          CHECK(settling_time(chain, every(dt), at_home(home), by, 2.0) < (std::abs(size) <= 0.03 ? 0.6 : 1.0));
+        }
+      }
+    }
+  }
+}
+
+TEST_CASE("a step of the target ends at rest under every jerk limit, in a time in proportion") {
+  for (const Home& home : kHomes) {
+    for (const double jerk : {20.0, 100.0, 500.0, 2000.0, 10000.0}) {
+      for (const double size : {0.01, 0.1}) {
+        for (const int axis : {0, 2, 4}) {
+          CAPTURE(std::string(home.name));
+          CAPTURE(jerk);
+          CAPTURE(size);
+          CAPTURE(axis);
+          JointLimits limits = arm(home.name).limits();
+          limits.jerk.setConstant(jerk);
+          const Chain chain = arm(home.name).with_limits(limits);
+          Twist by = Twist::Zero();
+          by[axis] = -size;
+          // The way grows with the third power of the time under a jerk limit, and with the second without.
+          const double most = 0.3 + 8.0 * std::cbrt(size / jerk) + 2.0 * std::sqrt(size);
+          CHECK(settling_time(chain, every(1e-3), at_home(home), by, most + 0.5) < most);
+        }
+      }
+    }
+  }
+}
+
+TEST_CASE("at a target out of reach the arm does not swing, and its joints end below 1 % of their speeds") {
+  for (const Home& home : kHomes) {
+    for (int axis = 0; axis < 3; ++axis) {
+      CAPTURE(std::string(home.name));
+      CAPTURE(axis);
+      const Chain chain = arm(home.name);
+      ConstrainedIk ik(chain, every(2e-3));
+      ik.reset(at_home(home));
+      Twist by = Twist::Zero();
+      by[axis] = 2.0;
+      const Pose target = moved(ik.tip(), by);
+      ConstrainedIkStep step;
+      for (int i = 0; i < 5000; ++i) step = ik.step(target);
+      CHECK(speed(chain, step.qdot) < 1e-2);
+      CHECK(step.status == Status::Limited);
+    }
+  }
+}
+
+TEST_CASE("a motion that is too fast leaves the tool upright, and the tool arrives") {
+  JointVector q(7);
+  q << 0.0, -0.4, 0.0, -2.0, 0.0, 1.6, 0.7;
+  for (const double jerk : {kInfinity, 2000.0}) {
+    JointLimits limits = arm("franka_panda").limits();
+    limits.jerk.setConstant(jerk);
+    const Chain chain = arm("franka_panda").with_limits(limits);
+    for (const double duration : {0.2, 0.3, 0.4, 0.5}) {
+      for (const int axis : {0, 1, 2}) {
+        CAPTURE(jerk);
+        CAPTURE(duration);
+        CAPTURE(axis);
+        ConstrainedIk ik(chain, every(1e-3));
+        ik.reset(q);
+        const Pose start = ik.tip();
+        double most = 0.0, late = 0.0;
+        for (double t = 1e-3; t < duration + 3.0; t += 1e-3) {
+          const double u = std::min(1.0, t / duration);
+          Twist by = Twist::Zero();
+          by[axis] = (axis == 1 ? 0.3 : -0.2) * u * u * u * (10.0 - 15.0 * u + 6.0 * u * u);
+          const ConstrainedIkStep step = ik.step(moved(start, by));
+          most = std::max(most, step.error.tail<3>().norm());
+          if (t > duration + 1.0) late = std::max({late, step.error.tail<3>().norm(), step.error.head<3>().norm()});
+        }
+        CHECK(most < 10.0 * M_PI / 180.0);
+        CHECK(late < 1e-4);
+      }
+    }
+  }
+}
+
+TEST_CASE("a smooth motion inside the limits is followed without a lag, under jerk limits, too") {
+  for (const Home& home : kHomes) {
+    for (const double jerk : {kInfinity, 5000.0}) {
+      JointLimits limits = arm(home.name).limits();
+      limits.jerk.setConstant(jerk);
+      ConstrainedIk ik(arm(home.name).with_limits(limits), every(1e-3));
+      ik.reset(at_home(home));
+      const Pose start = ik.tip();
+      for (int i = 0; i < 3000; ++i) {
+        CAPTURE(std::string(home.name));
+        CAPTURE(jerk);
+        CAPTURE(i);
+        const double wave = 1.0 - std::cos(2e-3 * i), bump = wave * wave;
+        Twist by;
+        by << 0.01 * bump, -0.01 * bump, -0.01 * bump, 0.02 * bump, 0.02 * bump, -0.02 * bump;
+        const ConstrainedIkStep step = ik.step(moved(start, by));
+        REQUIRE(step.error.norm() < 1e-6);
+        REQUIRE(step.status != Status::Limited);
+      }
+    }
+  }
+}
+
+namespace {
+
+// The line of 0.2 m past the wrist's singularity, there and back, of "sigmaik axis5 --example 1", or straight across
+// it, of "--example 2"; `offset` [rad] of axis 5 from zero, where it is closest.
+struct Line {
+  JointVector start = JointVector::Zero(6);
+  Pose from;
+  Eigen::Vector3d way;
+  double duration;
+  bool back;
+
+  Line(const Chain& chain, bool past, double offset, double seconds) : duration(seconds), back(past) {
+    constexpr double kDegree = M_PI / 180.0;
+    if (past) {
+      start << 0.0, -90.0, 90.0, 90.0, 0.0, -90.0;
+    } else {
+      start << 0.0, -80.0, 100.0, 0.0, 0.0, 0.0;
+    }
+    start *= kDegree;
+    start[4] = offset;
+    from = pose(chain, start);
+    way = past ? Eigen::Vector3d(0.0, 0.0, -0.2) : Eigen::Vector3d(0.0, 0.2, 0.0);
+    if (!past) return;
+    const AnalyticIk closed(chain);
+    from.translation() -= 0.5 * way;
+    for (int k = 500; k >= 0; --k) {
+      Pose here = from;
+      here.translation() += 1e-3 * k * way;
+      start = closed.nearest(here, start).branch.q;
+    }
+  }
+
+  Pose at(double t) const {
+    double u = std::clamp(t / duration, 0.0, back ? 2.0 : 1.0);
+    if (u > 1.0) u = 2.0 - u;
+    Pose out = from;
+    out.translation() += u * u * u * (10.0 - 15.0 * u + 6.0 * u * u) * way;
+    return out;
+  }
+};
+
+}  // namespace
+
+TEST_CASE("time scaling looks ahead: all six rows stay exact past and from a singularity, and the end is reached") {
+  const Chain chain = arm("kuka_kr6_r900");
+  for (const bool past : {true, false}) {
+    for (const double offset : {0.0, 1e-3, 0.01, 0.1, 0.3, 1.0, 2.0}) {
+      if (past && offset < 0.1) continue;
+      for (const double duration : {0.5, 0.7, 2.0}) {
+        for (const double dt : {1e-3, 4e-3}) {
+          CAPTURE(past);
+          CAPTURE(offset);
+          CAPTURE(duration);
+          CAPTURE(dt);
+          const Line line(chain, past, offset * M_PI / 180.0, duration);
+          ConstrainedIkOptions o = every(dt);
+          o.exact.fill(true);
+          o.gamma = 0.005 * std::sqrt(dt / 4e-3);
+          ConstrainedIk ik(chain, o);
+          ik.reset(line.start);
+          const double end = past ? 2.0 * duration : duration;
+          double clock = 0.0, off = 0.0;
+          int cycles = 0;
+          const int most = static_cast<int>(8.0 / dt);
+          for (; clock < end + 0.1 && cycles < most; ++cycles) {
+            const ConstrainedIkStep step = ik.step(line.at(clock + dt));
+            clock += (1.0 - step.time_scale) * dt;
+            off = std::max(off, step.path_error.norm());
+          }
+          CHECK(cycles < most);
+          CHECK(off < 1e-6);
+        }
+      }
+    }
+  }
 }
 
 TEST_CASE("bad targets stop the arm; bad options are refused with the facts") {

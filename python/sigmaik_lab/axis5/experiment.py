@@ -50,7 +50,7 @@ _CLOSE_BY = (0.0, -90.0, 90.0, 90.0, 0.0, -90.0)  # [°]
 _ACROSS = (0.0, -80.0, 100.0, 0.0, 0.0, 0.0)  # [°]
 
 _MOST_SAMPLES = 200_000
-_STUCK = 0.25  # [s] at a complete stop, after which a run is given up
+_STUCK = 0.25  # [s] at a complete stop of target and joints, after which a run is given up
 
 
 @dataclass(frozen=True)
@@ -221,7 +221,8 @@ def run(motion: Motion, variant: str, settings: Axis5Settings, progress: Callabl
         k += 1
         step = ik.update(motion.target(clock + dt))
         clock = clock + (1.0 - step.time_scale) * dt if step.time_scale > 0.0 else clock + dt
-        standing = standing + dt if step.time_scale > 1.0 - 1e-6 else 0.0
+        stands = step.time_scale > 1.0 - 1e-6 and bool(np.all(np.abs(step.qdot) < 1e-6))
+        standing = standing + dt if stands else 0.0
         recorder.add(clock, step.q, step.error, step.path_error, step)
         if progress is not None and k % 100 == 0:
             progress(100)
