@@ -18,7 +18,9 @@ bool Servo::arrive(const Twist& feedforward, JointVector& qdot) noexcept {
   const double gain = std::max(options_.gain_linear, options_.gain_angular);
   if (gain == 0.0) return false;
   if (feedforward.isZero(0.0)) {
-    const double part = calm() * tracker_.arrival(qdot, gain);
+    double part = calm() * tracker_.arrival(qdot, gain);
+    if (rested_ > settling_time_)
+      part /= std::max(1.0, qdot.cwiseProduct(solver_.pace().slowness).cwiseAbs().maxCoeff());
     if (part < 1.0) qdot *= part;
     return part < 1.0;
   }
