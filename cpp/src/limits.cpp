@@ -32,8 +32,6 @@ double fastest_before(double d, double a) noexcept {
   return d / (steps + 1.0) + 0.5 * a * steps;
 }
 
-}  // namespace
-
 // The velocity from which a joint can stop within d, under |v'| ≤ a and |v''| ≤ j, from no acceleration to none: D⁻¹ of
 // LimitTracker::arrival(). In velocities and cycles.
 double speed_before(double d, double a, double j) noexcept {
@@ -45,6 +43,8 @@ double speed_before(double d, double a, double j) noexcept {
 
 // Parts of the acceleration and jerk limits that the plan of an arrival uses.
 constexpr double kArrivalAcceleration = 0.5, kArrivalJerk = 0.125;
+
+}  // namespace
 
 // The velocities that one joint may choose, and the limits that form the ends.
 struct LimitTracker::Window {

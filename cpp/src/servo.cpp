@@ -150,9 +150,7 @@ bool Servo::measure(const JointRef& q, const JointRef& qdot) noexcept {
     following_error_ += std::min(1.0, options_.dt / kMeasuringTime) * (q - tracker_.q() - following_error_);
   }
   measured_ = true;
-  ChainState state;
-  sigmaik::update(chain_, tracker_.q() + following_error_, state);
-  measured_tip_ = state.tip;
+  measured_tip_ = pose(chain_, tracker_.q() + following_error_);
   return true;
 }
 

@@ -2,20 +2,12 @@
 
 #include <sigmaik/servo.hpp>
 
+#include "angular_rows.hpp"
+
 namespace sigmaik {
 namespace {
 
-// Bit i: row i of the task is angular.
-std::uint8_t angular_rows(const Task& task) noexcept {
-  std::uint8_t angular = 0;
-  int row = 0;
-  for (unsigned i = 0; i < 6; ++i) {
-    if (!task.mask[i]) continue;
-    if (i >= 3) angular |= static_cast<std::uint8_t>(1u << row);
-    ++row;
-  }
-  return angular;
-}
+using detail::angular_rows;
 
 // Multiplies the angular rows by the length scale.
 template <typename Rows>

@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 
+#include "angular_rows.hpp"
 #include "finite.hpp"
 #include "message.hpp"
 
@@ -25,6 +26,7 @@ Solution refuse(const TaskJacobianRef& jacobian) noexcept {
   return s;
 }
 
+using detail::angular_rows;
 using detail::finite;
 
 bool finite(const TaskJacobianRef& x) noexcept {
@@ -40,19 +42,6 @@ TaskVector product(const TaskJacobianRef& jacobian, const JointVector& qdot) noe
     sum += qdot[j] * Eigen::Map<const Twist>(jacobian.data() + j * jacobian.outerStride());
   }
   return sum;
-}
-
-// Bit i: row i of the task is angular.
-std::uint8_t angular_rows(const Task& task) noexcept {
-  if (task.rows() == 6) return 0b111000;
-  std::uint8_t angular = 0;
-  int row = 0;
-  for (unsigned i = 0; i < 6; ++i) {
-    if (!task.mask[i]) continue;
-    if (i >= 3) angular |= static_cast<std::uint8_t>(1u << row);
-    ++row;
-  }
-  return angular;
 }
 
 }  // namespace
