@@ -292,7 +292,7 @@ bool ConstrainedIk::optimise_once(const Pose& target, const Twist& motion, doubl
     }
     q = from + solution.x.head(n);
   }
-  if (!arriving_ && brakes() && solution.equality_error > kMet) {
+  if (!arriving_ && tracker_.delays() && solution.equality_error > kMet) {
     state_ = start;
     return false;
   }

@@ -37,9 +37,6 @@ LeastSquaresSolution ConstrainedIk::solve_freely() noexcept {
   return closing_.solve(p);
 }
 
-// Whether acceleration or jerk limits are held. Without them the arm stops at once, wherever it is.
-bool ConstrainedIk::brakes() const noexcept { return tracker_.least_acceleration() < kInfinity || tracker_.has_jerk(); }
-
 // The largest part of an error that a cycle closes without limits.
 double ConstrainedIk::decay() const noexcept {
   double part = exact_.rows() > 0 ? std::min(1.0, options_.dt / kSettling) : 0.0;
@@ -54,7 +51,7 @@ double ConstrainedIk::decay() const noexcept {
 // Whether the target jumps: no posture lets the joints reach this velocity of the tip in one cycle. Also true where an
 // error of the approximate rows has become so large that the arm would swing about the target.
 bool ConstrainedIk::jumps(const Twist& motion) const noexcept {
-  if (!brakes()) return false;
+  if (!tracker_.delays()) return false;
   const double dt = options_.dt;
   Eigen::Vector2d most = Eigen::Vector2d::Zero();
   for (int i = 0; i < chain_.dof(); ++i) {
@@ -81,7 +78,7 @@ ConstrainedIk::Closing ConstrainedIk::close(bool still) noexcept {
   Closing out;
   const int n = chain_.dof();
   out.qdot = JointVector::Zero(n);
-  if (!brakes()) return out;
+  if (!tracker_.delays()) return out;
   out.behind = -pose_error(state_.tip, reference_);
   const TaskVector behind = select_rows(options_.task, state_.tip.linear(), out.behind);
   out.small = behind.cwiseAbs().maxCoeff() <= kMet;

@@ -30,7 +30,7 @@ constexpr double kTurnStep = M_PI / 24.0;  // [rad, m] of the search for a turn
 
 // Whether ϑ alone can give way, so that it has to be known ahead.
 bool ConstrainedIk::previews() const noexcept {
-  return options_.gamma && brakes() && chain_.dof() == 6 && exact_.whole();
+  return options_.gamma && tracker_.delays() && chain_.dof() == 6 && exact_.whole();
 }
 
 // In a singularity the target may ask for a direction that no joint motion makes. Where two axes are in line, the
@@ -175,8 +175,7 @@ void ConstrainedIk::set_limits(Preview::Point& point, double step, const Twist& 
   // From x at the point, x is x + u Δℓ in the middle.
   for (int i = 0; i < 6; ++i) {
     const auto k = static_cast<std::size_t>(i);
-    const double given = chain_.limits().acceleration[i];
-    const double limit = kReserve * (given < kInfinity ? given : options_.limits.assumed_acceleration);
+    const double limit = kReserve * tracker_.acceleration_limit(i);
     double a = slope[i] + step * bend[i], b = bend[i];
     if (a < 0.0) {
       a = -a;

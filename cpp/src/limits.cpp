@@ -348,7 +348,7 @@ double LimitTracker::least_jerk() const noexcept {
 
 double LimitTracker::least_acceleration() const noexcept {
   double least = kInfinity;
-  for (int i = 0; i < n_; ++i) least = std::min(least, acceleration_[static_cast<std::size_t>(i)] * per_dt_);
+  for (int i = 0; i < n_; ++i) least = std::min(least, acceleration_limit(i));
   return least;
 }
 

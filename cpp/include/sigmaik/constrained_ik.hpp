@@ -187,7 +187,6 @@ class ConstrainedIk {
   void set_limits(Preview::Point& point, double step, const Twist& slope, const Twist& bend) const noexcept;
 
   bool try_analytic(const Pose& target, ConstrainedIkStep& step) noexcept;
-  bool brakes() const noexcept;
   double decay() const noexcept;
   Closing close(bool still) noexcept;
   bool jumps(const Twist& motion) const noexcept;

@@ -44,6 +44,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 
 #include <sigmaik/chain.hpp>
 #include <sigmaik/layout.hpp>
@@ -138,6 +139,11 @@ class LimitTracker {
 
   /// [rad/s or m/s], the velocity limit of joint i that is held; infinite where there is none.
   double velocity_limit(int i) const noexcept { return velocity_[static_cast<std::size_t>(i)]; }
+  /// [rad/s² or m/s²], the acceleration limit of joint i that is held, the assumed one where the model has none;
+  /// infinite where there is none.
+  double acceleration_limit(int i) const noexcept { return acceleration_[static_cast<std::size_t>(i)] * per_dt_; }
+  /// Whether acceleration or jerk limits are held: a command then takes time.
+  bool delays() const noexcept { return has_jerk() || least_acceleration() < std::numeric_limits<double>::infinity(); }
   /// Whether a joint has a jerk limit that is held.
   bool has_jerk() const noexcept { return with_jerk_ != 0; }
   /// [rad/s² or m/s²], the least of the acceleration limits that are held; infinite where there is none.
