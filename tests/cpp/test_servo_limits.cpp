@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <map>
 
 #include <sigmaik/constrained_ik.hpp>
@@ -15,6 +14,7 @@
 
 #include "arms.hpp"
 #include "heap.hpp"
+#include "jump.hpp"
 #include "methods.hpp"
 #include "numbers.hpp"
 #include "oracles.hpp"
@@ -760,22 +760,6 @@ TEST_CASE("bad input in motion: a stop as fast as the limits allow, and on again
 }
 
 TEST_CASE("no jumps where the set of held joints changes, as commands move and as the arm moves") {
-  // Halves the interval again and again, keeping the half that changes more: a jump stays, a slope vanishes.
-  const auto closest = [](const std::function<VectorXd(double)>& f, double a, double b) {
-    VectorXd fa = f(a), fb = f(b);
-    for (int k = 0; k < 26; ++k) {
-      const double middle = 0.5 * (a + b);
-      const VectorXd fm = f(middle);
-      if ((fm - fa).norm() > (fb - fm).norm()) {
-        b = middle;
-        fb = fm;
-      } else {
-        a = middle;
-        fa = fm;
-      }
-    }
-    return (fb - fa).norm();
-  };
   constexpr int kSteps = 300;
   double by_command = 0.0, over_rule = 0.0, by_state = 0.0, tool_by_state = 0.0, jump = 0.0;
   long switches = 0, steps = 0, swings = 0;
@@ -848,7 +832,7 @@ TEST_CASE("no jumps where the set of held joints changes, as commands move and a
       }
       if (where > 0) {
         const double end = static_cast<double>(where) / kSteps;
-        const double left = closest(at_command, end - 1.0 / kSteps, end);
+        const double left = test::jump_within(at_command, end - 1.0 / kSteps, end, 26);
         CHECK(left < 1e-5);
         jump = std::max(jump, left);
       }
