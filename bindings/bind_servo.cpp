@@ -114,7 +114,7 @@ void bind_measurement(py::class_<Servo>& c) {
        "Tells the servo where the arm is, before `update`: in each cycle, or as often as the arm is measured.\n\n"
        "The pose error of `update` is then that of the arm and not that of the reference, through a low-pass filter "
        "of\n"
-       "0.1 s: the tool arrives although the joints' controllers leave an error, and noise does not enter the "
+       "0.1 s: the tool arrives although the joints' controllers leave an error, and little of the noise enters the "
        "command.\n"
        "The command stays continuous and inside all limits, which hold for the reference.\n\n"
        "q: (n,) measured positions [rad or m].\n"

@@ -35,6 +35,12 @@ void check_joints(const char* what, const JointRef& values, const Chain& chain) 
   }
 }
 
+// Part of its velocity limit below which a joint is at rest.
+constexpr double kRest = 1e-3;
+
+// [rad or m] A following error that changes by more while the reference rests comes from outside.
+constexpr double kMoved = 1e-3;
+
 // [s] time constant of measure(): a hundred cycles of noise, and several times the lag of a joint's controller.
 constexpr double kMeasuringTime = 0.1;
 
@@ -108,7 +114,7 @@ Servo::Servo(Chain chain, const Method& method, const ServoOptions& options)
   }
   solver_.set_pace(pace_of(tracker_, solver_.length_scale()));
   settling_time_ = settling_time_of(tracker_, chain_.limits());
-  following_error_ = JointVector::Zero(chain_.dof());
+  following_error_ = expected_error_ = JointVector::Zero(chain_.dof());
 }
 
 void Servo::reset(const JointRef& q, const JointRef& qdot, const JointRef& qddot) {
@@ -132,10 +138,10 @@ void Servo::begin(const JointRef& posture) noexcept {
   slowing_.reset();
   exact_spectrum_ = rest_spectrum_ = Spectrum{};
   sigmaik::update(chain_, tracker_.q(), state_);
-  fade_ = rested_ = 0.0;
-  reversals_ = 0;
-  last_way_ = JointVector::Zero(chain_.dof());
+  fade_ = 0.0;
+  expect_motion();
   following_error_.setZero();
+  expected_error_.setZero();
   measured_ = false;
 }
 
@@ -150,6 +156,11 @@ bool Servo::measure(const JointRef& q, const JointRef& qdot) noexcept {
     following_error_ += std::min(1.0, options_.dt / kMeasuringTime) * (q - tracker_.q() - following_error_);
   }
   measured_ = true;
+  // The arm was moved while the reference rested: this is no swing, and no creep.
+  if (resting() && (following_error_ - expected_error_).cwiseAbs().maxCoeff() > kMoved) {
+    expected_error_ = following_error_;
+    expect_motion();
+  }
   measured_tip_ = pose(chain_, tracker_.q() + following_error_);
   return true;
 }
@@ -161,7 +172,10 @@ void Servo::continue_from(const Servo& other) {
   begin(other.nominal_);
 }
 
-void Servo::set_method(const Method& method) { solver_.set_method(method); }
+void Servo::set_method(const Method& method) {
+  solver_.set_method(method);
+  expect_motion();  // the new rule may do what the last one could not
+}
 
 JointVector Servo::posture_velocity() const noexcept {
   JointVector velocity;
@@ -203,25 +217,28 @@ ServoStep Servo::update(const Pose& target, const Twist& feedforward) noexcept {
 void Servo::watch(const Pose& target, ServoStep& step) noexcept {
   if (target.matrix() != last_target_.matrix()) {
     last_target_ = target;
-    rested_ = 0.0;
-    reversals_ = 0;
-    last_way_.setZero();
+    expect_motion();
     return;
   }
   // Without limits that delay the command, a motion that does not settle is the rule's own.
-  if (!(tracker_.least_acceleration() < kInfinity) && !tracker_.has_jerk()) return;
+  if (!tracker_.delays()) return;
   count_reversals(step.qdot);
   rested_ += options_.dt;
   if (rested_ < settling_time_) return;
+  step.not_settling = !resting();
+}
+
+// Whether the last command is slower than kRest in each joint.
+bool Servo::resting() const noexcept {
   for (int i = 0; i < chain_.dof(); ++i) {
-    const double limit = tracker_.velocity_limit(i);
-    if (std::abs(step.qdot[i]) > 1e-3 * (limit < kInfinity ? limit : 1.0)) step.not_settling = true;
+    if (std::abs(part_of_limit(i, tracker_.qdot()[i])) > kRest) return false;
   }
+  return true;
 }
 
 ServoStep Servo::update_twist(const Twist& twist) noexcept {
   if (!detail::finite(twist)) return stop(Status::BadInput);
-  rested_ = 0.0;
+  expect_motion();
   return resolve(twist, nullptr, qdot_start_.size() != 0 && !qdot_start_.isZero(0.0));
 }
 

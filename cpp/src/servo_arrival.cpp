@@ -19,8 +19,9 @@ bool Servo::arrive(const Twist& feedforward, JointVector& qdot) noexcept {
   if (gain == 0.0) return false;
   if (feedforward.isZero(0.0)) {
     double part = calm() * tracker_.arrival(qdot, gain);
-    if (rested_ > settling_time_)
+    if (rested_ > settling_time_) {  // the fade starts from no more than the velocity limits
       part /= std::max(1.0, qdot.cwiseProduct(solver_.pace().slowness).cwiseAbs().maxCoeff());
+    }
     if (part < 1.0) qdot *= part;
     return part < 1.0;
   }
@@ -43,13 +44,25 @@ double Servo::calm() const noexcept {
   return part;
 }
 
+// What is expected of a target that rests starts anew: its settling time, and the count of reversals.
+void Servo::expect_motion() noexcept {
+  rested_ = 0.0;
+  reversals_ = 0;
+  last_way_ = JointVector::Zero(chain_.dof());
+}
+
+// The velocity as a part of joint i's limit; as it is where there is none.
+double Servo::part_of_limit(int i, double velocity) const noexcept {
+  const double limit = tracker_.velocity_limit(i);
+  return limit < kInfinity ? velocity / limit : velocity;
+}
+
 // A reversal: q̇, in parts of the velocity limits, points against the fastest q̇ since the last reversal.
 void Servo::count_reversals(const JointVector& qdot) noexcept {
   constexpr double kSlow = 1e-4;  // of the velocity limits: a slower motion is at rest
   double along = 0.0, now = 0.0, then = 0.0;
   for (int i = 0; i < chain_.dof(); ++i) {
-    const double limit = tracker_.velocity_limit(i), per = limit < kInfinity ? 1.0 / limit : 1.0;
-    const double v = per * qdot[i], w = per * last_way_[i];
+    const double v = part_of_limit(i, qdot[i]), w = part_of_limit(i, last_way_[i]);
     along += v * w;
     now += v * v;
     then += w * w;
@@ -62,8 +75,8 @@ void Servo::count_reversals(const JointVector& qdot) noexcept {
 // Velocity limits: the motion keeps its direction, and gives up speed. Where the arm can move without moving the tool,
 // this motion takes part first (Flacco, De Luca and Khatib 2015): of all velocities inside the limits whose twist is a
 // part s of the rule's, the answer has the largest s, and of these the answer is the nearest to the rule's. Where there
-// are exact rows, this is their twist, and the other rows give way before these rows do. Returns whether q̇ changed.
-bool Servo::slow_down(ServoStep& step) noexcept {
+// are exact rows, this is their twist, and the other rows give way before these rows do.
+void Servo::slow_down(ServoStep& step) noexcept {
   const int n = chain_.dof();
   double part = 1.0;
   int slowest = -1;
@@ -74,12 +87,12 @@ bool Servo::slow_down(ServoStep& step) noexcept {
       slowest = i;
     }
   }
-  if (slowest < 0) return false;
+  if (slowest < 0) return;
   const Spectrum& spectrum = has_exact() ? exact_spectrum_ : solver_.spectrum();
   if (options_.on_limit == OnLimit::Scale || spectrum.size() >= n) {
     step.qdot *= part;
     step.limiting_joints |= static_cast<std::uint16_t>(1u << slowest);
-    return true;
+    return;
   }
   // In x = q̇ − q̇_rule and t = (1 − s)/kSlower: min |x|² + t² where J x + kSlower J q̇_rule t = 0. In the coordinates of
   // the singular vectors the rows are v_iᵀ, so that a singular direction of J weighs as much as another.
@@ -113,7 +126,6 @@ bool Servo::slow_down(ServoStep& step) noexcept {
     step.qdot *= part;
     step.limiting_joints |= static_cast<std::uint16_t>(1u << slowest);
   }
-  return true;
 }
 
 }  // namespace sigmaik

@@ -785,7 +785,7 @@ class Servo:
         Tells the servo where the arm is, before `update`: in each cycle, or as often as the arm is measured.
 
         The pose error of `update` is then that of the arm and not that of the reference, through a low-pass filter of
-        0.1 s: the tool arrives although the joints' controllers leave an error, and noise does not enter the command.
+        0.1 s: the tool arrives although the joints' controllers leave an error, and little of the noise enters the command.
         The command stays continuous and inside all limits, which hold for the reference.
 
         q: (n,) measured positions [rad or m].

@@ -13,6 +13,7 @@
 #include "limit_watch.hpp"
 #include "numbers.hpp"
 #include "random.hpp"
+#include "settling.hpp"
 #include "stopping_time.hpp"
 
 namespace {
@@ -31,36 +32,6 @@ JointVector joints(std::initializer_list<double> values) {
   return q;
 }
 
-// Uniform in `part` of the joints' ranges; continuous joints have a turn.
-JointVector start_of(Random& random, const Chain& chain, double part) {
-  JointVector q(chain.dof());
-  for (int i = 0; i < chain.dof(); ++i) {
-    const bool limited = std::isfinite(chain.limits().upper[i]);
-    const double lower = limited ? chain.limits().lower[i] : -std::numbers::pi;
-    const double upper = limited ? chain.limits().upper[i] : std::numbers::pi;
-    q[i] = 0.5 * (lower + upper) + part * random.uniform(-0.5, 0.5) * (upper - lower);
-  }
-  return q;
-}
-
-// A configuration inside the limits, each joint at most `size` from q.
-JointVector near(Random& random, const Chain& chain, const JointVector& q, double size) {
-  JointVector goal(chain.dof());
-  for (int i = 0; i < chain.dof(); ++i) {
-    goal[i] = random.uniform(std::max(chain.limits().lower[i], q[i] - size),
-                             std::min(chain.limits().upper[i], q[i] + size));
-  }
-  return goal;
-}
-
-bool at_rest(const Chain& chain, const JointVector& qdot) {
-  for (int i = 0; i < chain.dof(); ++i) {
-    const double limit = chain.limits().velocity[i];
-    if (!(std::abs(qdot[i]) < 1e-3 * (std::isfinite(limit) ? limit : 1.0))) return false;
-  }
-  return true;
-}
-
 double distance(const Servo& servo, const Pose& target) {
   return (servo.tip().translation() - target.translation()).norm();
 }
@@ -74,12 +45,20 @@ bool rests(Servo& servo, const Pose& target, double time, bool there) {
   double still = 0.0;
   for (double t = 0.0; t < time; t += dt) {
     watch.step(servo.update(target));
-    const bool good = at_rest(servo.chain(), servo.qdot()) &&
+    const bool good = test::at_rest(servo.chain(), servo.qdot()) &&
                       (!there || (distance(servo, target) < 1e-3 && angle(servo, target) < kHalfDegree));
     still = good ? still + dt : 0.0;
     if (still > 0.5) break;
   }
   return still > 0.0 && watch.broken == 0;
+}
+
+// Ordinary postures of four arms.
+std::map<std::string, JointVector> four_postures() {
+  return {{"ur10", joints({0.0, -1.2, 1.5, -1.87, -1.57, 0.0})},
+          {"ufactory_xarm7", joints({0.0, -0.5, 0.0, 1.0, 0.0, 1.2, 0.0})},
+          {"franka_panda", joints({0.0, -0.4, 0.0, -2.0, 0.0, 1.6, 0.7})},
+          {"kuka_lbr_iiwa_14_r820", joints({0.0, 0.5, 0.0, -1.5, 0.0, 1.1, 0.0})}};
 }
 
 Chain with_dynamics(const Chain& chain, double acceleration, double jerk) {
@@ -99,8 +78,8 @@ TEST_CASE("a near target is reached within four seconds, to 1 mm and half a degr
     for (int trial = 0; trial < 12; ++trial) {
       CAPTURE(name);
       CAPTURE(trial);
-      const JointVector q = start_of(random, chain, 0.98);
-      const Pose target = pose(chain, near(random, chain, q, 0.25));
+      const JointVector q = test::start_of(random, chain, 0.98);
+      const Pose target = pose(chain, test::near(random, chain, q, 0.25));
       Servo servo(chain);
       servo.reset(q);
       test::LimitWatch watch(chain.limits(), servo.options().dt, JointVector::Zero(chain.dof()));
@@ -128,8 +107,8 @@ TEST_CASE("a near target is reached, and the arm rests there, under jerk limits 
         options.on_limit = on_limit;
         Servo servo(chain, JParse{}, options);
         // A direction that a position limit blocks is given up by Scale, so there the way is clear of these limits.
-        const JointVector q = start_of(random, chain, on_limit == OnLimit::Scale ? 0.6 : 0.98);
-        const Pose target = pose(chain, near(random, chain, q, 0.25));
+        const JointVector q = test::start_of(random, chain, on_limit == OnLimit::Scale ? 0.6 : 0.98);
+        const Pose target = pose(chain, test::near(random, chain, q, 0.25));
         servo.reset(q);
         CHECK(rests(servo, target, servo.settling_time(), true));
       }
@@ -170,7 +149,7 @@ TEST_CASE("after a twist command ends, the arm rests within 1.5 times the stoppi
   const int cycles = static_cast<int>(1.5 * least / dt) + 1;
   for (int cycle = 0; cycle < cycles; ++cycle) watch.step(servo.update_twist(Twist::Zero()));
   for (int cycle = 0; cycle < 500; ++cycle) {
-    CHECK(at_rest(chain, servo.qdot()));
+    CHECK(test::at_rest(chain, servo.qdot()));
     watch.step(servo.update_twist(Twist::Zero()));
   }
   CHECK(watch.broken == 0);
@@ -192,16 +171,12 @@ TEST_CASE("a turn about the tool's own axis leaves the tool's point where it is,
     }
     CHECK(most < 1e-3);
     CHECK(angle(servo, target) < kHalfDegree);
-    CHECK(at_rest(chain, servo.qdot()));
+    CHECK(test::at_rest(chain, servo.qdot()));
   }
 }
 
 TEST_CASE("a translation without position limits is straight within 1 mm") {
-  for (const auto& [key, start] :
-       std::map<std::string, JointVector>{{"ur10", joints({0.0, -1.2, 1.5, -1.87, -1.57, 0.0})},
-                                          {"ufactory_xarm7", joints({0.0, -0.5, 0.0, 1.0, 0.0, 1.2, 0.0})},
-                                          {"franka_panda", joints({0.0, -0.4, 0.0, -2.0, 0.0, 1.6, 0.7})},
-                                          {"kuka_lbr_iiwa_14_r820", joints({0.0, 0.5, 0.0, -1.5, 0.0, 1.1, 0.0})}}) {
+  for (const auto& [key, start] : four_postures()) {
     const std::string& name = key;
     const Chain& chain = arms().at(name);
     for (int direction = 0; direction < 6; ++direction) {
@@ -231,7 +206,7 @@ TEST_CASE("arms of a tenth, twice, a thousand times and a thousandth of the size
   for (const auto& [key, chain] : arms()) {
     const std::string& name = key;
     Random random(3);
-    const JointVector q = start_of(random, chain, 0.9), goal = near(random, chain, q, 0.25);
+    const JointVector q = test::start_of(random, chain, 0.9), goal = test::near(random, chain, q, 0.25);
     for (const double size : {0.1, 2.0, 1000.0, 0.001}) {
       CAPTURE(name);
       CAPTURE(size);
@@ -260,7 +235,7 @@ TEST_CASE("towards a target beyond reach an industrial arm of six joints comes t
       CAPTURE(name);
       CAPTURE(trial);
       Servo servo(chain);
-      servo.reset(start_of(random, chain, 0.9));
+      servo.reset(test::start_of(random, chain, 0.9));
       Pose target = servo.tip();
       target.translation() += 4.0 * random.unit(3);
       CHECK(rests(servo, target, servo.settling_time(), false));
@@ -313,7 +288,7 @@ TEST_CASE("10 to 100 mm inside the edge of reach, where the arm is straight, the
       servo.reset(start);
       for (int cycle = 0; cycle < 5000; ++cycle) servo.update(target);
       CHECK(distance(servo, target) <= 1e-4);
-      CHECK(at_rest(chain, servo.qdot()));
+      CHECK(test::at_rest(chain, servo.qdot()));
     }
   }
 }
@@ -356,11 +331,7 @@ TEST_CASE("exact position rows: an arm of five joints reaches the position of a 
 }
 
 TEST_CASE("exact position rows: towards targets 0.3 rad beyond each joint's limit the arm comes to rest") {
-  for (const auto& [key, start] :
-       std::map<std::string, JointVector>{{"ur10", joints({0.0, -1.2, 1.5, -1.87, -1.57, 0.0})},
-                                          {"ufactory_xarm7", joints({0.0, -0.5, 0.0, 1.0, 0.0, 1.2, 0.0})},
-                                          {"franka_panda", joints({0.0, -0.4, 0.0, -2.0, 0.0, 1.6, 0.7})},
-                                          {"kuka_lbr_iiwa_14_r820", joints({0.0, 0.5, 0.0, -1.5, 0.0, 1.1, 0.0})}}) {
+  for (const auto& [key, start] : four_postures()) {
     const std::string& name = key;
     const Chain& chain = arms().at(name);
     for (int joint = 0; joint < chain.dof(); ++joint) {
@@ -380,6 +351,21 @@ TEST_CASE("exact position rows: towards targets 0.3 rad beyond each joint's limi
       }
     }
   }
+}
+
+TEST_CASE("another rule goes on towards a target that has rested for longer than the settling time") {
+  const Chain& chain = arms().at("ur10");
+  ServoOptions options;
+  options.dt = 0.004;
+  Servo servo(chain, JacobianProjection{1.0}, options);  // does one direction of six
+  servo.reset(joints({0.0, -1.2, 1.5, -1.87, -1.57, 0.0}));
+  Pose target = servo.tip();
+  target.translation() += Eigen::Vector3d(-0.1, 0.05, 0.1);
+  for (double t = 0.0; t < servo.settling_time() + 12.0; t += options.dt) servo.update(target);
+  CHECK(test::at_rest(chain, servo.qdot()));
+  REQUIRE(distance(servo, target) > 0.01);
+  servo.set_method(JParse{});
+  CHECK(rests(servo, target, 4.0, true));
 }
 
 TEST_CASE("a motion that settles is not reported, and one that moves after the settling time is") {
@@ -416,8 +402,8 @@ TEST_CASE("a motion that settles is not reported, and one that moves after the s
   for (double t = 0.0; t < restless.settling_time() + 1.0; t += options.dt) {
     const ServoStep step = restless.update(target);
     CHECK((!step.not_settling || t >= restless.settling_time() - 2.0 * options.dt));
-    if (step.not_settling) CHECK(!at_rest(chain, step.qdot));
-    if (t > restless.settling_time() + options.dt) CHECK(step.not_settling == !at_rest(chain, step.qdot));
+    if (step.not_settling) CHECK(!test::at_rest(chain, step.qdot));
+    if (t > restless.settling_time() + options.dt) CHECK(step.not_settling == !test::at_rest(chain, step.qdot));
     reported = reported || step.not_settling;
   }
   CHECK(reported);

@@ -106,6 +106,28 @@ TEST_CASE(
   CHECK(watch.broken == 0);
 }
 
+TEST_CASE("an arm that is moved while its target rests comes back, however long the target has rested") {
+  const Chain& chain = arms().at("ur10");
+  ServoOptions options;
+  options.dt = 4e-3;
+  Servo servo(chain, JParse{}, options);
+  servo.reset(start());
+  const Pose target = behind(servo);
+  test::LimitWatch watch(chain.limits(), options.dt, JointVector::Zero(6));
+  JointVector moved = JointVector::Zero(6);
+  for (const double push : {0.0, 0.05, -0.03, 0.04, -0.05, 0.02}) {
+    CAPTURE(push);
+    moved.setConstant(push);
+    // Longer than the settling time and its fade: a servo that has given up would stay where it is.
+    for (double t = 0.0; t < servo.settling_time() + 12.0; t += options.dt) {
+      CHECK(servo.measure(JointVector(servo.q() + moved)));
+      watch.step(servo.update(target));
+    }
+    CHECK(off(chain, servo.q() + moved, target) < 1e-4);
+  }
+  CHECK(watch.broken == 0);
+}
+
 TEST_CASE("the filter of the measurements: a step of the error is followed with a time constant of 0.1 s") {
   const Chain& chain = arms().at("ur10");
   Servo servo(chain, JParse{}, slow_cycle());

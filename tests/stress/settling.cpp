@@ -27,14 +27,14 @@
 #include "limit_watch.hpp"
 #include "methods.hpp"
 #include "random.hpp"
+#include "settling.hpp"
 
 namespace {
 
 using namespace sigmaik;
 using test::Random;
 
-constexpr double kRest = 1e-3;  // of the velocity limits
-constexpr double kFade = 8.0;   // [s] after the settling time: e⁻⁸ of a velocity limit is at rest
+constexpr double kFade = 8.0;  // [s] after the settling time: e⁻⁸ of a velocity limit is at rest
 
 enum Target { kNear, kFar, kOutOfReach, kBeyondLimit, kZeroTwist, kTargets };
 constexpr std::array<const char*, kTargets> kTargetNames{"near", "anywhere", "out of reach", "beyond a joint limit",
@@ -67,7 +67,7 @@ struct Counts {
 
 struct Case {
   Chain chain;
-  JointVector start, beyond;
+  JointVector start;
   Target kind;
   Pose target;
   double dt;
@@ -81,53 +81,24 @@ Chain with_dynamics(Random& random, const Chain& chain) {
   return chain.with_limits(limits);
 }
 
-double middle(const JointLimits& limits, int i) {
-  return std::isfinite(limits.lower[i] + limits.upper[i]) ? 0.5 * (limits.lower[i] + limits.upper[i]) : 0.0;
-}
-
-double half_range(const JointLimits& limits, int i) {
-  const double range = limits.upper[i] - limits.lower[i];
-  return 0.49 * (std::isfinite(range) ? range : 2.0 * M_PI);
-}
-
-JointVector anywhere(Random& random, const Chain& chain) {
-  JointVector q(chain.dof());
-  for (int i = 0; i < chain.dof(); ++i) {
-    q[i] = middle(chain.limits(), i) + half_range(chain.limits(), i) * random.uniform(-1.0, 1.0);
-  }
-  return q;
-}
-
 Case draw(Random& random) {
   const auto& arms = test::arms();
   const Chain& shipped = std::next(arms.begin(), random.integer(0, static_cast<int>(arms.size()) - 1))->second;
-  Case c{with_dynamics(random, shipped), {}, {}, static_cast<Target>(random.integer(0, kTargets - 1)), {}, 0.0};
+  Case c{with_dynamics(random, shipped), {}, static_cast<Target>(random.integer(0, kTargets - 1)), {}, 0.0};
   c.dt = random.chance(0.5) ? 0.001 : 0.004;
-  c.start = anywhere(random, c.chain);
-  JointVector goal = anywhere(random, c.chain);
-  if (c.kind == kNear) {
-    for (int i = 0; i < c.chain.dof(); ++i) {
-      const double m = middle(c.chain.limits(), i), h = half_range(c.chain.limits(), i);
-      goal[i] = std::clamp(c.start[i] + random.uniform(-0.25, 0.25), m - h, m + h);
-    }
-  } else if (c.kind == kBeyondLimit) {
+  c.start = test::start_of(random, c.chain, 0.98);
+  JointVector goal = c.kind == kNear ? test::near(random, c.chain, c.start, 0.25)
+                                     : test::start_of(random, c.chain, 0.98);
+  if (c.kind == kBeyondLimit) {
     goal = c.start;
     const int i = random.integer(0, c.chain.dof() - 1);
-    goal[i] = middle(c.chain.limits(), i) + (random.chance(0.5) ? 1.0 : -1.0) * (half_range(c.chain.limits(), i) + 0.3);
+    const double lower = c.chain.limits().lower[i], upper = c.chain.limits().upper[i];
+    const bool up = random.chance(0.5);
+    goal[i] = std::isfinite(upper) ? (up ? upper + 0.3 : lower - 0.3) : (up ? M_PI : -M_PI);
   }
-  ChainState state;
-  update(c.chain, goal, state);
-  c.target = state.tip;
+  c.target = pose(c.chain, goal);
   if (c.kind == kOutOfReach) c.target.translation() *= random.uniform(1.5, 4.0);
   return c;
-}
-
-bool at_rest(const Chain& chain, const JointVector& qdot) {
-  for (int i = 0; i < chain.dof(); ++i) {
-    const double limit = chain.limits().velocity[i];
-    if (!(std::abs(qdot[i]) < kRest * (std::isfinite(limit) ? limit : 1.0))) return false;
-  }
-  return true;
 }
 
 ServoOptions options_of(Random& random, const Case& c) {
@@ -152,7 +123,7 @@ Count settle(const Case& c, double time, Cycle&& cycle) {
   for (; t < time && still < 0.5; t += c.dt) {
     there = cycle(t, q, qdot);
     watch.step(q, qdot);
-    still = at_rest(c.chain, qdot) ? still + c.dt : 0.0;
+    still = test::at_rest(c.chain, qdot) ? still + c.dt : 0.0;
   }
   count.at_rest = still > 0.0 ? 1 : 0;
   count.arrived = there ? 1 : 0;

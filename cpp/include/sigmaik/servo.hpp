@@ -112,7 +112,8 @@ struct ServoStep {
 ///     limits' delay allows the swing dies out.
 ///   - A motion that creeps along a valley of |e|², for example of a redundant arm beyond its reach, has no bound in
 ///     time. After settling_time() such a motion is faded out with a time constant of 1 s, and not_settling says so.
-///     A target that rests therefore always brings the arm to rest.
+///     A target that rests therefore always brings the arm to rest. Another target, another rule, a twist command, or a
+///     measured arm that was moved while it rested starts both counts anew.
 ///
 /// A servo remembers the motion that it commanded (LimitTracker), the posture, the fading after reset(), and
 /// guesses that make the next cycle cheap and continuous: decompositions and an active set.
@@ -196,6 +197,7 @@ class Servo {
   bool fade_in(JointVector& qdot, bool fade) noexcept;
   void take(ServoStep& step, bool achieved) noexcept;
   void watch(const Pose& target, ServoStep& step) noexcept;
+  bool resting() const noexcept;
 
   // servo_priority.cpp
   bool has_exact() const noexcept { return options_.exact != std::array<bool, 6>{}; }
@@ -205,8 +207,10 @@ class Servo {
   // servo_arrival.cpp
   bool arrive(const Twist& feedforward, JointVector& qdot) noexcept;
   double calm() const noexcept;
+  void expect_motion() noexcept;
+  double part_of_limit(int i, double velocity) const noexcept;
   void count_reversals(const JointVector& qdot) noexcept;
-  bool slow_down(ServoStep& step) noexcept;
+  void slow_down(ServoStep& step) noexcept;
 
   // servo_limits.cpp
   void limit(ServoStep& step) noexcept;
@@ -232,7 +236,8 @@ class Servo {
   Resolution exact_resolution_;
   ChainState state_;
   JointVector nominal_, qdot_start_, following_error_;
-  JointVector last_way_;  // the fastest q̇ since the motion turned round last
+  JointVector expected_error_;  // the following error of a resting arm that nobody has moved since
+  JointVector last_way_;        // the fastest q̇ since the motion turned round last
   int reversals_ = 0;
   Pose measured_tip_ = Pose::Identity(), last_target_ = Pose::Identity();
   double max_linear_error_, settling_time_ = 0.0;
