@@ -76,6 +76,9 @@ void bind_step(py::module_& m) {
       .def_readonly("torque_active", &ConstrainedIkStep::torque_active, "A torque limit is active, or cannot be met.")
       .def_readonly("error_active", &ConstrainedIkStep::error_active, "max_error is active, or has been let go.")
       .def_readonly("exact_met", &ConstrainedIkStep::exact_met, "The exact part's equations hold.")
+      .def_readonly("not_settling", &ConstrainedIkStep::not_settling,
+                    "The target has rested for longer than any motion takes (ConstrainedIk.settling_time), and the arm "
+                    "still moves.")
       .def_property_readonly(
           "used", [](const ConstrainedIkStep& s) { return std::string(to_string(s.used)); },
           "'analytic' or 'optimised'")
@@ -117,6 +120,8 @@ void bind_state(py::class_<ConstrainedIk>& c) {
   c.def_property_readonly("chain", &ConstrainedIk::chain)
       .def_property_readonly(
           "dt", [](const ConstrainedIk& ik) { return ik.options().dt; }, "[s]")
+      .def_property_readonly("settling_time", &ConstrainedIk::settling_time,
+                             "[s], after which a motion towards a target that rests is faded out.")
       .def_property_readonly("has_analytic", &ConstrainedIk::has_analytic, "Whether the closed form is at hand.")
       .def_property_readonly("q", once_started([](const ConstrainedIk& ik) { return ik.q(); }),
                              "(n,) where the reference stands.")

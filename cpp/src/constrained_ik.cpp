@@ -94,6 +94,7 @@ void ConstrainedIk::reset(const JointRef& q, const JointRef& qdot) {
   preview_.count = 0;
   turn_.resize(0);
   stuck_ = false;
+  rested_ = 0.0;
   last_motion_.setZero();
   last_way_ = 0.0;
   end_arrival();
@@ -115,6 +116,7 @@ ConstrainedIkStep ConstrainedIk::update(const Pose& target) noexcept {
       if (least > 0.0 || !try_analytic(target, step)) optimise(target, motion, least, step);
     }
     if (step.used == IkSource::Analytic) end_arrival();
+    fade(target, step);
     last_motion_ = motion;
     last_way_ = (1.0 - step.time_scale) * motion.norm();
     stuck_ = step.time_scale > kStuck && motion.norm() > kMet;
@@ -124,6 +126,7 @@ ConstrainedIkStep ConstrainedIk::update(const Pose& target) noexcept {
   last_free_ = step.used == IkSource::Analytic ||
                (good && analytic_ && !dynamics_ && !held && agrees(*analytic_, target, tracker_, step.qdot));
   tracker_.advance(step.qdot);
+  step.not_settling = rested_ >= settling_time() && !tracker_.resting();
   step.q = tracker_.q();
   sigmaik::update(chain_, step.q, state_);
   if (!good) {

@@ -19,6 +19,7 @@ constexpr double kCalming = 0.05;   // [s] of swinging that divides the patience
 constexpr double kPatience = 0.02;  // a smaller patience is none
 constexpr double kJump = 0.5;       // part of the joints' bounds; a larger change of the target's motion is a jump
 constexpr double kLarge = 0.1;      // [rad, m] an error of the approximate rows that needs an arrival
+constexpr double kFade = 1.0;       // [s] time constant of a motion's end after the settling time
 constexpr int kTurns = 2;           // times that the closing motion may turn against the arm before it is calmed
 
 }  // namespace
@@ -167,9 +168,13 @@ void ConstrainedIk::settle(const Closing& closing, const Twist& motion, double m
   double share = std::min(1.0, missed / kMissed);
   if (tracker_.has_jerk()) share = std::max(share, std::min(1.0, closing.size));
   if (!(share > 0.0)) return;
-  const JointVector wanted = (1.0 - step.time_scale) * follow(motion) + closing.qdot;
+  head_for(head((1.0 - step.time_scale) * follow(motion) + closing.qdot), share, step);
+}
+
+// Mixes q̇ with the joints' way to a velocity, in proportion, by the share of the way.
+void ConstrainedIk::head_for(const JointVector& velocity, double share, ConstrainedIkStep& step) noexcept {
   const VelocityBounds& bounds = tracker_.bounds();
-  const JointVector way = tracker_.approach(head(wanted)).cwiseMax(bounds.lower).cwiseMin(bounds.upper) - step.qdot;
+  const JointVector way = tracker_.approach(velocity).cwiseMax(bounds.lower).cwiseMin(bounds.upper) - step.qdot;
   if (dynamics_) {  // torque limits come first
     prepare();
     for (int k = 0; k < torque_rows_; ++k) {
@@ -185,6 +190,24 @@ void ConstrainedIk::settle(const Closing& closing, const Twist& motion, double m
       step.active |= static_cast<std::uint16_t>(1u << i);
     }
   }
+}
+
+// A motion that still goes on after the settling time ends; see constrained_ik.hpp. Without limits that delay the
+// joints, a motion that does not settle is the options' own.
+void ConstrainedIk::fade(const Pose& target, ConstrainedIkStep& step) noexcept {
+  if (target.matrix() != last_target_.matrix()) {
+    last_target_ = target;
+    rested_ = 0.0;
+    return;
+  }
+  if (!tracker_.delays()) return;
+  rested_ += options_.dt;
+  const double over = rested_ - settling_time();
+  if (over < 0.0) return;
+  const JointVector velocity = std::exp(-over / kFade) * step.qdot;
+  if (velocity == step.qdot) return;
+  step.used = IkSource::Optimised;
+  head_for(velocity, 1.0, step);
 }
 
 // The part of the exact rows' change of velocity that the limits leave undone, in [0, 1].

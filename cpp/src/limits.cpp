@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <utility>
 
 #include "finite.hpp"
@@ -110,6 +111,7 @@ LimitTracker::LimitTracker(const JointLimits& limits, double dt, const LimitOpti
     recovery_[at] = options.recovery_speed * limits.velocity[i];
     if (jerk_[at] < kInfinity) with_jerk_ |= 1u << i;
   }
+  settling_time_ = longest_settling();
 }
 
 void LimitTracker::reset(const JointRef& q, const JointRef& qdot, const JointRef& qddot) {
@@ -350,6 +352,32 @@ double LimitTracker::least_acceleration() const noexcept {
   double least = kInfinity;
   for (int i = 0; i < n_; ++i) least = std::min(least, acceleration_limit(i));
   return least;
+}
+
+double LimitTracker::part_of_limit(int i, double velocity) const noexcept {
+  const double limit = velocity_limit(i);
+  return limit < kInfinity ? velocity / limit : velocity;
+}
+
+bool LimitTracker::resting() const noexcept {
+  constexpr double kRest = 1e-3;
+  for (int i = 0; i < n_; ++i) {
+    if (std::abs(part_of_limit(i, v_[i])) > kRest) return false;
+  }
+  return true;
+}
+
+double LimitTracker::longest_settling() const noexcept {
+  constexpr double kTurn = 2.0 * std::numbers::pi;
+  double longest = 0.0;
+  for (int i = 0; i < n_; ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    const double range = upper_[at] - lower_[at], way = range < kInfinity ? range : kTurn;
+    // The time of a motion with each limit alone adds up to more than that of a motion with all limits.
+    longest = std::max(longest, way / velocity_[at] + 2.0 * std::sqrt(way / acceleration_limit(i)) +
+                                    4.0 * std::cbrt(way / (jerk_[at] * per_dt_ * per_dt_)));
+  }
+  return 3.0 + 3.0 * longest;
 }
 
 LimitTracker::Window LimitTracker::window(int i, bool& broken) const noexcept {

@@ -35,9 +35,6 @@ void check_joints(const char* what, const JointRef& values, const Chain& chain) 
   }
 }
 
-// Part of its velocity limit below which a joint is at rest.
-constexpr double kRest = 1e-3;
-
 // [rad or m] A following error that changes by more while the reference rests comes from outside.
 constexpr double kMoved = 1e-3;
 
@@ -58,22 +55,6 @@ Pace pace_of(const LimitTracker& tracker, double length_scale) {
                                      std::cbrt(tracker.least_jerk() / kAmplitude)});
   pace.lag = length_scale / bandwidth;
   return pace;
-}
-
-// See Servo::settling_time().
-double settling_time_of(const LimitTracker& tracker, const JointLimits& limits) {
-  double longest = 0.0;
-  for (int i = 0; i < tracker.dof(); ++i) {
-    constexpr double kTurn = 6.283185307179586;
-    const double range = limits.upper[i] - limits.lower[i];
-    const double way = tracker.options().position && std::isfinite(range) ? range : kTurn;
-    const double most = tracker.velocity_limit(i), a = std::min(limits.acceleration[i], tracker.least_acceleration());
-    // The time of a motion with each limit alone adds up to more than that of a motion with all limits.
-    double time = way / most + 2.0 * std::sqrt(way / a);
-    if (tracker.options().jerk) time += 4.0 * std::cbrt(way / limits.jerk[i]);
-    longest = std::max(longest, time);
-  }
-  return 3.0 + 3.0 * longest;
 }
 
 // The singular directions as twists. The solution gives their columns u_i in the rows of the task.
@@ -113,7 +94,6 @@ Servo::Servo(Chain chain, const Method& method, const ServoOptions& options)
     rest_.mask[i] = options.task.mask[i] && !options.exact[i];
   }
   solver_.set_pace(pace_of(tracker_, solver_.length_scale()));
-  settling_time_ = settling_time_of(tracker_, chain_.limits());
   following_error_ = expected_error_ = JointVector::Zero(chain_.dof());
 }
 
@@ -157,7 +137,7 @@ bool Servo::measure(const JointRef& q, const JointRef& qdot) noexcept {
   }
   measured_ = true;
   // The arm was moved while the reference rested: this is no swing, and no creep.
-  if (resting() && (following_error_ - expected_error_).cwiseAbs().maxCoeff() > kMoved) {
+  if (tracker_.resting() && (following_error_ - expected_error_).cwiseAbs().maxCoeff() > kMoved) {
     expected_error_ = following_error_;
     expect_motion();
   }
@@ -224,16 +204,8 @@ void Servo::watch(const Pose& target, ServoStep& step) noexcept {
   if (!tracker_.delays()) return;
   count_reversals(step.qdot);
   rested_ += options_.dt;
-  if (rested_ < settling_time_) return;
-  step.not_settling = !resting();
-}
-
-// Whether the last command is slower than kRest in each joint.
-bool Servo::resting() const noexcept {
-  for (int i = 0; i < chain_.dof(); ++i) {
-    if (std::abs(part_of_limit(i, tracker_.qdot()[i])) > kRest) return false;
-  }
-  return true;
+  if (rested_ < settling_time()) return;
+  step.not_settling = !tracker_.resting();
 }
 
 ServoStep Servo::update_twist(const Twist& twist) noexcept {

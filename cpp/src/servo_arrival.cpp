@@ -19,7 +19,7 @@ bool Servo::arrive(const Twist& feedforward, JointVector& qdot) noexcept {
   if (gain == 0.0) return false;
   if (feedforward.isZero(0.0)) {
     double part = calm() * tracker_.arrival(qdot, gain);
-    if (rested_ > settling_time_) {  // the fade starts from no more than the velocity limits
+    if (rested_ > settling_time()) {  // the fade starts from no more than the velocity limits
       part /= std::max(1.0, qdot.cwiseProduct(solver_.pace().slowness).cwiseAbs().maxCoeff());
     }
     if (part < 1.0) qdot *= part;
@@ -40,7 +40,7 @@ double Servo::calm() const noexcept {
   constexpr double kFade = 1.0;  // [s] time constant after the settling time
   double part = 1.0;
   if (reversals_ > kFree) part = std::pow(kLess, std::min(reversals_ - kFree, 20));
-  if (rested_ > settling_time_) part *= std::exp(std::max(-50.0, (settling_time_ - rested_) / kFade));
+  if (rested_ > settling_time()) part *= std::exp(std::max(-50.0, (settling_time() - rested_) / kFade));
   return part;
 }
 
@@ -51,18 +51,12 @@ void Servo::expect_motion() noexcept {
   last_way_ = JointVector::Zero(chain_.dof());
 }
 
-// The velocity as a part of joint i's limit; as it is where there is none.
-double Servo::part_of_limit(int i, double velocity) const noexcept {
-  const double limit = tracker_.velocity_limit(i);
-  return limit < kInfinity ? velocity / limit : velocity;
-}
-
 // A reversal: q̇, in parts of the velocity limits, points against the fastest q̇ since the last reversal.
 void Servo::count_reversals(const JointVector& qdot) noexcept {
   constexpr double kSlow = 1e-4;  // of the velocity limits: a slower motion is at rest
   double along = 0.0, now = 0.0, then = 0.0;
   for (int i = 0; i < chain_.dof(); ++i) {
-    const double v = part_of_limit(i, qdot[i]), w = part_of_limit(i, last_way_[i]);
+    const double v = tracker_.part_of_limit(i, qdot[i]), w = tracker_.part_of_limit(i, last_way_[i]);
     along += v * w;
     now += v * v;
     then += w * w;

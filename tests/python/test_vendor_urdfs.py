@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import sigmaik as sk
+from sigmaik_lab.arrival import experiment as arrival
 
 TOLERANCE = 1e-12  # m, and entries of rotations
 SEED = 11
@@ -239,6 +240,55 @@ def test_arm_as_in_pinocchio(name, tip, dof):
         np.testing.assert_allclose(
             chain.jacobian(q), jacobian[:, [model.idx_vs[i] for i in ids]], rtol=0, atol=TOLERANCE
         )
+
+
+@pytest.mark.filterwarnings("ignore::sigmaik.ModelWarning")
+@pytest.mark.parametrize(("name", "tip", "dof"), ARMS, ids=IDS)
+def test_near_targets_are_reached_without_tuning(name, tip, dof):
+    """Every joint moves by up to 0.25 rad. The PR2's first joint, its torso, would take 20 s for 0.25 m."""
+    settings = arrival.ArrivalSettings(trials=20, rate=500.0, seed=3)
+    chain = sk.Chain.from_urdf(FILES[name], tip=tip)
+    if "pr2" in name:
+        chain = sk.Chain.from_urdf(FILES[name], "torso_lift_link", tip)
+    done = arrival.drive(chain, arrival.draw_trials(chain, settings), "default", settings)
+    assert np.all(done.excess == 0.0)
+    assert np.all(np.isfinite(done.time))
+    assert np.median(done.time) <= 0.8
+
+
+@pytest.mark.filterwarnings("ignore::sigmaik.ModelWarning")
+@pytest.mark.parametrize(("name", "tip", "dof"), ARMS, ids=IDS)
+def test_small_commands_are_done_in_nine_postures_of_ten(name, tip, dof):
+    """Also by small arms, whose singular values are small. The command is one that joints make: arms of 4 and 5 joints
+    have twists that no joint velocity makes."""
+    rng = np.random.default_rng(SEED)
+    chain = sk.Chain.from_urdf(FILES[name], tip=tip)
+    servo = sk.Servo(chain, acceleration_limits=False)
+    damped = 0
+    for trial in arrival.draw_trials(chain, arrival.ArrivalSettings(trials=200, seed=SEED)):
+        servo.reset(trial.start)
+        slowly = 0.01 * np.minimum(chain.limits.velocity, 1.0) * rng.uniform(-1.0, 1.0, dof)
+        damped += servo.update_twist(chain.jacobian(trial.start) @ slowly).status != sk.Status.OK
+    assert damped <= 20
+
+
+@pytest.mark.filterwarnings("ignore::sigmaik.ModelWarning")
+def test_an_arm_of_five_joints_keeps_its_position_and_gives_up_the_tilt():
+    chain = sk.Chain.from_urdf(FILES["example-robot-data/so_arm_description/so101.urdf"], tip="gripper_frame_link")
+    servo = sk.Servo(chain, exact=(1, 1, 1, 0, 0, 0), dt=2e-3)
+    rng = np.random.default_rng(SEED)
+    middle, half = 0.5 * (chain.limits.lower + chain.limits.upper), 0.5 * (chain.limits.upper - chain.limits.lower)
+    for _ in range(20):
+        start = middle + 0.6 * half * rng.uniform(-1.0, 1.0, 5)
+        target = chain.pose(start + rng.uniform(-0.25, 0.25, 5))
+        axis = rng.normal(size=3)
+        target[:3, :3] = turn(axis / np.linalg.norm(axis), rng.uniform(0.1, 0.25)) @ target[:3, :3]
+        servo.reset(start)
+        for _ in range(2000):
+            step = servo.update(target)
+        error = sk.pose_error(servo.pose, target)
+        assert np.linalg.norm(error[:3]) <= 1e-4
+        assert np.linalg.norm(error[3:]) <= 0.5
 
 
 @pytest.mark.parametrize(("name", "tip", "dof"), ARMS, ids=IDS)

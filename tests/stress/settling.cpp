@@ -165,33 +165,32 @@ Count run_servo(Random& random, const Case& c, bool talk) {
   return count;
 }
 
-Count run_constrained(const Case& c, double time) {
+Count run_constrained(const Case& c) {
   ConstrainedIkOptions options;
   options.dt = c.dt;
   ConstrainedIk ik(c.chain, options);
   ik.reset(c.start);
-  return settle(c, time, [&](double, JointVector& q, JointVector& qdot) {
+  bool faded = false;
+  Count count = settle(c, ik.settling_time() + kFade, [&](double, JointVector& q, JointVector& qdot) {
     const ConstrainedIkStep step = ik.update(c.target);
     q = step.q;
     qdot = step.qdot;
+    faded = faded || step.not_settling;
     return met(step.error);
   });
+  count.faded = faded ? 1 : 0;
+  return count;
 }
 
 void run(unsigned number, bool talk, Counts& counts) {
   Random random(number);
   const Case c = draw(random);
   const auto at = static_cast<std::size_t>(c.kind);
-  if (random.chance(0.85) || c.kind == kZeroTwist) {
-    if (talk) std::printf("%s\n", kTargetNames[at]);
-    const Count count = run_servo(random, c, talk);
-    counts.servo[at].add(count);
-    if (count.at_rest == 0 || count.broken != 0) counts.failed.push_back(number);
-  } else {
-    const Servo servo(c.chain, JParse{}, {.dt = c.dt});
-    counts.constrained[at].add(run_constrained(c, servo.settling_time() + kFade));
-    if (counts.constrained[at].broken != 0) counts.failed.push_back(number);
-  }
+  const bool servo = random.chance(0.85) || c.kind == kZeroTwist;
+  if (talk) std::printf("%s\n", kTargetNames[at]);
+  const Count count = servo ? run_servo(random, c, talk) : run_constrained(c);
+  (servo ? counts.servo : counts.constrained)[at].add(count);
+  if (count.at_rest == 0 || count.broken != 0) counts.failed.push_back(number);
 }
 
 void print(const char* name, const std::array<Count, kTargets>& counts) {

@@ -44,6 +44,10 @@
 /// and again. From the second such turn at a resting target on, c is cut, until it is zero; it comes back when the
 /// target moves.
 ///
+/// Along a valley of the error the arm may creep for as long as it likes. After settling_time() at a resting target q̇
+/// is faded out with a time constant of 1 s, and not_settling says so: a target that rests always brings the arm to
+/// rest.
+///
 /// *Looking ahead.* With all six rows of a six-axis arm exact, only ϑ can give way, and ϑ of one cycle comes too late
 /// where the path bends the joints' motion soon. The step therefore previews the path, as if the target went on in the
 /// direction of Δx_d: points (ℓ, q) at most 2 mm or 0.02 rad of a joint apart, each by a step of Newton's method from
@@ -123,6 +127,8 @@ struct ConstrainedIkStep {
   bool error_active = false;         ///< max_error is active, or has been given up
   /// The exact part's linearised equations hold, and no exact error is left for the coming cycles.
   bool exact_met = true;
+  /// The target has rested for longer than any motion of the arm takes (settling_time()), and the arm still moves.
+  bool not_settling = false;
   IkSource used = IkSource::Optimised;  ///< where the step comes from
 };
 
@@ -155,6 +161,8 @@ class ConstrainedIk {
   const Pose& tip() const noexcept { return state_.tip; }
   /// The pose that the last step aimed at: its target, slowed down by ϑ.
   const Pose& reference() const noexcept { return reference_; }
+  /// [s], after which a motion towards a target that rests is faded out; see LimitTracker::settling_time().
+  double settling_time() const noexcept { return tracker_.settling_time(); }
 
  private:
   struct Linearisation;
@@ -198,6 +206,8 @@ class ConstrainedIk {
   JointVector head(const JointVector& wanted) const noexcept;
   double missed(const LeastSquaresSolution& solution) const noexcept;
   bool exceeds(const Eigen::Matrix3d& rotation, const Closing& closing) const noexcept;
+  void head_for(const JointVector& velocity, double share, ConstrainedIkStep& step) noexcept;
+  void fade(const Pose& target, ConstrainedIkStep& step) noexcept;
   void settle(const Closing& closing, const Twist& motion, double missed, ConstrainedIkStep& step) noexcept;
   void optimise(const Pose& target, const Twist& motion, double least, ConstrainedIkStep& step) noexcept;
   void prepare() noexcept;
@@ -226,7 +236,8 @@ class ConstrainedIk {
   Preview preview_;
   JointVector turn_;    // where a motion of the joints that leaves the tip at rest ends; empty: there is none
   bool stuck_ = false;  // the last step stood still before its target
-  Pose reference_ = Pose::Identity();
+  Pose reference_ = Pose::Identity(), last_target_ = Pose::Identity();
+  double rested_ = 0.0;    // [s] since the target changed last
   bool last_free_ = true;  // the last step was closed form, or met no limit and agreed with it
 };
 

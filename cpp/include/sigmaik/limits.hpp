@@ -139,6 +139,8 @@ class LimitTracker {
 
   /// [rad/s or m/s], the velocity limit of joint i that is held; infinite where there is none.
   double velocity_limit(int i) const noexcept { return velocity_[static_cast<std::size_t>(i)]; }
+  /// The velocity as a part of joint i's velocity limit; as it is where there is none.
+  double part_of_limit(int i, double velocity) const noexcept;
   /// [rad/s² or m/s²], the acceleration limit of joint i that is held, the assumed one where the model has none;
   /// infinite where there is none.
   double acceleration_limit(int i) const noexcept { return acceleration_[static_cast<std::size_t>(i)] * per_dt_; }
@@ -150,6 +152,9 @@ class LimitTracker {
   double least_acceleration() const noexcept;
   /// [rad/s³ or m/s³], the least of the jerk limits that are held; infinite where there is none.
   double least_jerk() const noexcept;
+  /// [s], longer than any motion to a target that rests: three times the longest time that a joint takes through its
+  /// range, or through a turn where it has no range, and 3 s more.
+  double settling_time() const noexcept { return settling_time_; }
 
   /// (n,) [rad/s or m/s], inside the bounds: the coming cycle of the fastest stop.
   const JointVector& stop() const noexcept { return stop_; }
@@ -164,6 +169,9 @@ class LimitTracker {
   const JointVector& q() const noexcept { return q_; }
   /// (n,) [rad/s or m/s], of the last cycle.
   const JointVector& qdot() const noexcept { return v_; }
+
+  /// Whether each joint is slower than a thousandth of its velocity limit, or than 0.001 rad/s or m/s where it has none.
+  bool resting() const noexcept;
 
   /// Bit i: joint i is outside its position limits.
   std::uint16_t outside() const noexcept { return outside_; }
@@ -197,6 +205,7 @@ class LimitTracker {
   unsigned survey() noexcept;
   void clear() noexcept;
   void update() noexcept;
+  double longest_settling() const noexcept;
   static void put(int i, const Window& window, VelocityBounds& to) noexcept;
   // Room to the position limits of joint i [velocities × cycles]; negative outside.
   double room_above(int i) const noexcept { return (upper_[static_cast<std::size_t>(i)] - q_[i]) * per_dt_; }
@@ -217,6 +226,7 @@ class LimitTracker {
   Numbers acceleration_;         // A dt
   Numbers jerk_;                 // J dt²
   Numbers recovery_;             // [rad/s or m/s], infinite without a velocity limit
+  double settling_time_ = 0.0;
   std::uint32_t with_jerk_ = 0;  // bit i: joint i has a jerk limit
   std::array<JerkMemory, kMaxJoints> jerk_states_{};
   JointVector q_, v_, stop_;

@@ -185,9 +185,8 @@ class Servo {
   double max_linear_error() const noexcept { return max_linear_error_; }
   /// How fast the arm can go by its limits, as the rule sees it.
   const Pace& pace() const noexcept { return solver_.pace(); }
-  /// [s], after which a motion towards a target that rests is faded out: three times the longest time that a joint
-  /// takes through its range, or through a turn, with its limits, and 3 s more.
-  double settling_time() const noexcept { return settling_time_; }
+  /// [s], after which a motion towards a target that rests is faded out; see LimitTracker::settling_time().
+  double settling_time() const noexcept { return tracker_.settling_time(); }
 
  private:
   void begin(const JointRef& posture) noexcept;
@@ -197,7 +196,6 @@ class Servo {
   bool fade_in(JointVector& qdot, bool fade) noexcept;
   void take(ServoStep& step, bool achieved) noexcept;
   void watch(const Pose& target, ServoStep& step) noexcept;
-  bool resting() const noexcept;
 
   // servo_priority.cpp
   bool has_exact() const noexcept { return options_.exact != std::array<bool, 6>{}; }
@@ -208,7 +206,6 @@ class Servo {
   bool arrive(const Twist& feedforward, JointVector& qdot) noexcept;
   double calm() const noexcept;
   void expect_motion() noexcept;
-  double part_of_limit(int i, double velocity) const noexcept;
   void count_reversals(const JointVector& qdot) noexcept;
   void slow_down(ServoStep& step) noexcept;
 
@@ -240,7 +237,7 @@ class Servo {
   JointVector last_way_;        // the fastest q̇ since the motion turned round last
   int reversals_ = 0;
   Pose measured_tip_ = Pose::Identity(), last_target_ = Pose::Identity();
-  double max_linear_error_, settling_time_ = 0.0;
+  double max_linear_error_;
   double fade_ = 1.0, rested_ = 0.0;
   bool measured_ = false;
 };

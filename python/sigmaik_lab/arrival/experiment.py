@@ -117,8 +117,8 @@ def draw_trials(chain: sk.Chain, settings: ArrivalSettings) -> list[Trial]:
     rng = np.random.default_rng(settings.seed)
     limits = chain.limits
     bounded = np.isfinite(limits.lower) & np.isfinite(limits.upper)
-    middle = np.where(bounded, 0.5 * (limits.lower + limits.upper), 0.0)
-    half = np.where(bounded, 0.5 * RANGE * (limits.upper - limits.lower), TURN)
+    lower, upper = np.where(bounded, limits.lower, -TURN / RANGE), np.where(bounded, limits.upper, TURN / RANGE)
+    middle, half = 0.5 * (lower + upper), 0.5 * RANGE * (upper - lower)
 
     def anywhere() -> Array:
         q: Array = middle + half * rng.uniform(-1.0, 1.0, chain.dof)
