@@ -68,8 +68,8 @@ void Servo::count_reversals(const JointVector& qdot) noexcept {
 
 // Velocity limits: the motion keeps its direction, and gives up speed. Where the arm can move without moving the tool,
 // this motion takes part first (Flacco, De Luca and Khatib 2015): of all velocities inside the limits whose twist is a
-// part s of the rule's, the answer has the largest s, and of these the answer is the nearest to the rule's. Where there
-// are exact rows, this is their twist, and the other rows give way before these rows do.
+// part s of the rule's, the answer has the largest s, and of these the answer is the nearest to the rule's. Exact rows
+// have a part s of their own, which comes before that of the other rows.
 void Servo::slow_down(ServoStep& step) noexcept {
   const int n = chain_.dof();
   double part = 1.0;
@@ -82,44 +82,59 @@ void Servo::slow_down(ServoStep& step) noexcept {
     }
   }
   if (slowest < 0) return;
-  const Spectrum& spectrum = has_exact() ? exact_spectrum_ : solver_.spectrum();
-  if (options_.on_limit == OnLimit::Scale || spectrum.size() >= n) {
+  const bool whole = !has_exact() && solver_.spectrum().size() >= n;
+  if (options_.on_limit == OnLimit::Scale || whole || !slow_down_by_rows(step)) {
     step.qdot *= part;
     step.limiting_joints |= static_cast<std::uint16_t>(1u << slowest);
-    return;
   }
-  // In x = q̇ − q̇_rule and t = (1 − s)/kSlower: min |x|² + t² where J x + kSlower J q̇_rule t = 0. In the coordinates of
-  // the singular vectors the rows are v_iᵀ, so that a singular direction of J weighs as much as another.
-  constexpr double kSlower = 1e-3;
+}
+
+// In x = q̇ − q̇_rule and t = (1 − s)/k: min |x|² + |t|² + |z|² where the rows' parts of x + k t q̇_rule are zero. In the
+// coordinates of the singular vectors the rows are v_iᵀ, so that a singular direction of J weighs as much as another.
+// With exact rows there are two groups of rows, and the second group consists of the other rows' part that leaves the
+// exact rows as they are. Singular directions of this part may be missed, by z: the row is (σ_i/w_i) v_iᵀ, and z_i has
+// the weight 1 − σ_i/w_i. Returns false where the numbers are too far apart.
+bool Servo::slow_down_by_rows(ServoStep& step) noexcept {
+  constexpr double kSlower = 1e-3;       // k: slower motion costs 1/k² times as much as another motion of the joints
+  constexpr double kSlowerRest = 3e-2;   // of the rows that are not exact: a thousand times less
+  const int n = chain_.dof();
+  const Spectrum& spectrum = has_exact() ? exact_spectrum_ : solver_.spectrum();
+  const int first = static_cast<int>(spectrum.size());
+  const int second = has_exact() && rest_.rows() != 0 ? static_cast<int>(rest_spectrum_.size()) : 0;
+  const int groups = second > 0 ? 2 : 1, unknowns = n + groups + second;
   const double largest = step.qdot.cwiseAbs().maxCoeff();
-  const auto m = spectrum.size();
-  problem_.C.setZero(m, n + 1);
-  for (int i = 0; i < m; ++i) {
+  problem_.C.setZero(first + second, unknowns);
+  problem_.d.setZero(first + second);
+  problem_.lower.setConstant(unknowns, -kInfinity);
+  problem_.upper.setConstant(unknowns, kInfinity);
+  for (int i = 0; i < first; ++i) {
     problem_.C.row(i).head(n) = spectrum.v(i).transpose();
     problem_.C(i, n) = kSlower * spectrum.v(i).dot(step.qdot) / largest;
   }
-  problem_.d.setZero(m);
-  problem_.lower.resize(n + 1);
-  problem_.upper.resize(n + 1);
+  for (int i = 0; i < second; ++i) {
+    const double weight = rest_resolution_.weight[static_cast<std::size_t>(i)];
+    const double regular = weight > 0.0 ? std::min(1.0, rest_spectrum_.sigma(i) / weight) : 0.0;
+    problem_.C.row(first + i).head(n) = regular * rest_spectrum_.v(i).transpose();
+    problem_.C(first + i, n + 1) = regular * kSlowerRest * rest_spectrum_.v(i).dot(step.qdot) / largest;
+    problem_.C(first + i, n + groups + i) = 1.0 - regular;
+  }
   for (int i = 0; i < n; ++i) {
     const double limit = tracker_.velocity_limit(i);
     problem_.lower[i] = (-limit - step.qdot[i]) / largest;
     problem_.upper[i] = (limit - step.qdot[i]) / largest;
   }
-  problem_.lower[n] = 0.0;
+  problem_.lower.segment(n, groups).setZero();
   problem_.upper[n] = 1.0 / kSlower;
+  if (groups > 1) problem_.upper[n + 1] = 1.0 / kSlowerRest;
   const LeastSquaresSolution solution = slowing_.solve(problem_);
-  if (solution.status == LeastSquaresStatus::Optimal) {
-    step.qdot += largest * solution.x.head(n);
-    step.limiting_joints |= static_cast<std::uint16_t>((solution.at_lower | solution.at_upper) & ((1u << n) - 1u));
-    for (int i = 0; i < n; ++i) {
-      const double limit = tracker_.velocity_limit(i);
-      step.qdot[i] = std::clamp(step.qdot[i], -limit, limit);
-    }
-  } else {  // numbers too far apart
-    step.qdot *= part;
-    step.limiting_joints |= static_cast<std::uint16_t>(1u << slowest);
+  if (solution.status != LeastSquaresStatus::Optimal) return false;
+  step.qdot += largest * solution.x.head(n);
+  step.limiting_joints |= static_cast<std::uint16_t>((solution.at_lower | solution.at_upper) & ((1u << n) - 1u));
+  for (int i = 0; i < n; ++i) {
+    const double limit = tracker_.velocity_limit(i);
+    step.qdot[i] = std::clamp(step.qdot[i], -limit, limit);
   }
+  return true;
 }
 
 }  // namespace sigmaik

@@ -54,10 +54,10 @@ void Servo::prioritize(const Twist& twist, const JointVector& posture, Solution&
       rows.row(row) = rest_of(JointVector(rows.row(row).transpose()), exact_spectrum_, exact_resolution_).transpose();
     }
     rest_spectrum_.decompose(rows);
-    const Resolution second = sigmaik::resolve(solver_.method(), rest_spectrum_, missed, angular_rows(rest_), pace);
-    qdot += rest_spectrum_.combine_v(second.speed);
-    exact = exact && second.exact;
-    if (posture.size() != 0) free = rest_of(free, rest_spectrum_, second);
+    rest_resolution_ = sigmaik::resolve(solver_.method(), rest_spectrum_, missed, angular_rows(rest_), pace);
+    qdot += rest_spectrum_.combine_v(rest_resolution_.speed);
+    exact = exact && rest_resolution_.exact;
+    if (posture.size() != 0) free = rest_of(free, rest_spectrum_, rest_resolution_);
   }
   if (posture.size() != 0) qdot += free;
   solution.qdot = qdot;

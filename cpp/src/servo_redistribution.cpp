@@ -15,13 +15,14 @@ constexpr double kJointWeight = 1e-2;
 // Weight of the exact rows against the other rows.
 constexpr double kExactWeight = 1e3;
 
-// Σ w_i u_i v_iᵀ, w_i the rule's weight of direction i (Resolution::weight). With S = Σ w_i u_i v_iᵀ the rule's q̇
-// minimises ½|S q̇|² − ẋᵀJ q̇, so what limits leave of q̇ has ẋᵀJ q̇ ≥ ½|S q̇|² wherever they allow rest: the tool never
-// moves away from the target. (Guptasarma et al., eq. 37, with limits and with any threshold.)
-void weigh(const Spectrum& spectrum, const Resolution& resolution, TaskJacobian& rows) noexcept {
-  rows.setZero(spectrum.rows(), spectrum.cols());
+// Adds Σ (w_i − σ_i) u_i v_iᵀ to the rows J, w_i the rule's weight of direction i (Resolution::weight). With the sum
+// S = Σ w_i u_i v_iᵀ the rule's q̇ minimises ½|S q̇|² − ẋᵀJ q̇, so what limits leave of q̇ has ẋᵀJ q̇ ≥ ½|S q̇|² wherever
+// they allow rest: the tool never moves away from the target. (Guptasarma et al., eq. 37, with limits and with any
+// threshold.)
+void raise(const Spectrum& spectrum, const Resolution& resolution, TaskJacobian& rows) noexcept {
   for (int i = 0; i < spectrum.size(); ++i) {
-    rows += resolution.weight[static_cast<std::size_t>(i)] * spectrum.u(i) * spectrum.v(i).transpose();
+    const double more = resolution.weight[static_cast<std::size_t>(i)] - spectrum.sigma(i);
+    if (more != 0.0) rows += more * spectrum.u(i) * spectrum.v(i).transpose();
   }
 }
 
@@ -40,21 +41,23 @@ JointVector Servo::redistribute(const JointVector& qdot, const VelocityBounds& b
   }
 
   // First, the problem has the exact rows alone.
-  TaskJacobian first;
-  weigh(exact_spectrum_, exact_resolution_, first);
+  TaskJacobian first = weighted_rows(exact_);
+  raise(exact_spectrum_, exact_resolution_, first);
   const JointVector begin = nearest(qdot, first, first.lazyProduct(qdot), exact_spectrum_.sigma(0), qdot, bounds, step);
+  if (rest_.rows() == 0) return begin;
 
-  // Then the problem has all rows, with so much weight on the exact rows that their part stays.
-  weigh(spectrum, resolution, rows_);
-  TaskVector goal = rows_.lazyProduct(qdot);
-  int row = 0, exact_row = 0;
-  for (std::size_t i = 0; i < 6; ++i) {
-    if (options_.exact[i]) {
-      rows_.row(row) = kExactWeight * first.row(exact_row++);
-      goal[row] = rows_.row(row).dot(begin);
-    }
-    if (options_.task.mask[i]) ++row;
-  }
+  // Then the problem has all rows, with so much weight on the exact rows that their part stays. The spectrum of the
+  // other rows is that of their part which leaves the exact rows as they are: only singular directions of this part are
+  // raised.
+  TaskJacobian second = weighted_rows(rest_);
+  raise(rest_spectrum_, rest_resolution_, second);
+  const int exact = exact_.rows(), rest = rest_.rows();
+  rows_.resize(exact + rest, chain_.dof());
+  rows_.topRows(exact) = kExactWeight * first;
+  rows_.bottomRows(rest) = second;
+  TaskVector goal(exact + rest);
+  goal.head(exact) = kExactWeight * first.lazyProduct(begin);
+  goal.tail(rest) = second.lazyProduct(qdot);
   return nearest(begin, rows_, goal, largest, qdot, bounds, step);
 }
 

@@ -208,6 +208,7 @@ class Servo {
   void expect_motion() noexcept;
   void count_reversals(const JointVector& qdot) noexcept;
   void slow_down(ServoStep& step) noexcept;
+  bool slow_down_by_rows(ServoStep& step) noexcept;
 
   // servo_limits.cpp
   void limit(ServoStep& step) noexcept;
@@ -230,7 +231,7 @@ class Servo {
   LeastSquaresProblem problem_;
   TaskJacobian rows_;
   Spectrum exact_spectrum_, rest_spectrum_;
-  Resolution exact_resolution_;
+  Resolution exact_resolution_, rest_resolution_;
   ChainState state_;
   JointVector nominal_, qdot_start_, following_error_;
   JointVector expected_error_;  // the following error of a resting arm that nobody has moved since
