@@ -28,6 +28,7 @@
 ///     servo.hpp            Servo: pose or twist in, joint command out, each cycle
 ///     target_stream.hpp    TargetStream: samples of a moving pose in, a smooth target out, each cycle
 ///     analytic_ik.hpp      AnalyticIk: every posture of a pose, for six joints with a spherical wrist
+///     position_ik.hpp      PositionIk: joint positions of a pose, any chain, inside position limits
 ///     dynamics.hpp         Dynamics: mass matrix, Coriolis, gravity, payload
 ///     computed_torque.hpp  ComputedTorque: joint torques along a planned motion
 ///     constrained_ik.hpp   ConstrainedIk: a pose exactly in part, the rest as limits allow; time scaling
@@ -76,6 +77,7 @@
 #include <sigmaik/limits.hpp>
 #include <sigmaik/parameters.hpp>
 #include <sigmaik/pose.hpp>
+#include <sigmaik/position_ik.hpp>
 #include <sigmaik/rules.hpp>
 #include <sigmaik/servo.hpp>
 #include <sigmaik/singularities.hpp>

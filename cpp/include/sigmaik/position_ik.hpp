@@ -1,0 +1,122 @@
+#pragma once
+/// \file position_ik.hpp
+/// Joint positions of a pose, for any chain, inside its position limits.
+///
+/// A solution is a minimum, with the value zero, of
+///
+///     E(q) = |e_p(q)/L|² + |e_o(q)|²   where   lower ≤ q ≤ upper
+///
+/// over the rows of the task, where [e_p; e_o] is pose_error and L is the chain's characteristic length. The descent is
+/// the method of Levenberg and Marquardt with a damping that is proportional to E (Sugihara, "Solvability-unconcerned
+/// inverse kinematics by the Levenberg–Marquardt method", IEEE Trans. Robotics 27(5), 2011):
+///
+///     min |r − J Δq|² + λ |Δq|²_W   where   lower ≤ q + Δq ≤ upper,   λ = c E
+///
+/// As the damping goes to zero with the error, the convergence is quadratic at a regular solution, and the descent
+/// converges at a singular solution, too. A joint that a step would take beyond a limit stays at the limit exactly, and
+/// the other joints take over (an active set; Bertsekas, "Projected Newton methods for optimization problems with
+/// simple constraints", SIAM J. Control Optim. 20(2), 1982). Orientations are compared by the logarithm of the rotation
+/// between them, which is accurate up to a half turn.
+///
+/// A descent ends in a local minimum for a part of the starts, mostly at a limit. Hence the constructor makes a table
+/// of configurations that are spread evenly over the joint ranges (an additive recurrence), with their poses. A search
+/// starts from the entries whose poses are closest to the target, one after the other. The order depends on nothing but
+/// the chain and the target: the same call gives the same answer.
+///
+/// Arms with a spherical wrist have a closed form (analytic_ik.hpp), which gives all solutions at once. The search
+/// follows only where none of these is inside the limits.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include <sigmaik/chain.hpp>
+#include <sigmaik/layout.hpp>
+#include <sigmaik/task.hpp>
+#include <sigmaik/types.hpp>
+
+namespace sigmaik {
+
+/// Settings of a PositionIk.
+struct PositionIkOptions {
+  std::array<double, 2> tolerance{1e-6, 1e-6};  ///< [m], [rad] > 0: largest errors of position and orientation
+  Task task;                                    ///< rows of the pose error that matter
+  int starts = 256;                             ///< in [1, 2048]: the most starts of a search
+};
+
+/// Result of PositionIk.
+enum class PositionIkStatus : std::int8_t {
+  Ok = 0,           ///< a solution, inside tolerance and limits
+  Unreachable = 1,  ///< none was found; q is the configuration with the smallest E that was found
+  BadInput = 2,     ///< NaN, infinite, not a rotation, or a wrong size
+};
+
+/// "ok", "unreachable", "bad input".
+const char* to_string(PositionIkStatus status) noexcept;
+
+/// Answer of PositionIk::solve(). By value, no heap.
+struct PositionIkResult {
+  JointVector q;                                         ///< (n,) [rad or m] inside the limits; empty after bad input
+  PositionIkStatus status = PositionIkStatus::BadInput;  ///< what was found
+  Twist error =
+      Twist::Zero();        ///< pose_error from q to the target, base axes; zero in the rows that the task leaves out
+  double solve_time = 0.0;  ///< [s]
+};
+
+/// One of the solutions of PositionIk::solve_all().
+struct PositionIkBranch {
+  JointVector q;           ///< (n,) [rad or m] inside the limits
+  double sigma_min = 0.0;  ///< least singular value of the task's rows, lengths in characteristic lengths
+  double margin = 0.0;     ///< [rad or m] from the nearest limit; infinite where no joint has a limit
+};
+
+/// Position inverse kinematics: tip pose in, joint positions out. A value: cheap to copy, safe to use from many
+/// threads.
+class PositionIk {
+ public:
+  /// Takes about a millisecond.
+  /// \throws Error where an option is out of its range
+  explicit PositionIk(const Chain& chain, const PositionIkOptions& options = {});
+
+  /// A solution of `pose` (tip in base): the first that the search finds, or of a closed form the one that is farthest
+  /// from the limits. Joints that may turn more than once are on the turn nearest to 0. noexcept, no heap, bounded.
+  PositionIkResult solve(const Pose& pose) const noexcept;
+
+  /// The solution nearest to `near` (n,) in travel time, max_i |q_i − near_i| / velocity limit_i (1 rad/s or m/s where
+  /// there is no limit), of those that a bounded search finds: from `near` first, then from the closest entries of the
+  /// table. Each joint is on the turn nearest to `near` within its limits, so that a continuous joint turns the short
+  /// way round. A redundant arm is then moved along its self-motion towards `near`, to a local minimum of the travel
+  /// time. noexcept, no heap, bounded; several times slower than solve(pose).
+  PositionIkResult solve(const Pose& pose, const JointRef& near) const noexcept;
+
+  /// The distinct solutions that `starts` descents find, those far from the limits first; empty where there is none.
+  /// Each joint is on the turn within its limits that is nearest to the middle of its range (0 where there is none), so
+  /// that solutions which differ by whole turns count once. For a redundant arm, each solution is moved along its
+  /// self-motion to a local minimum of the distance to the middle of the ranges; these minima are the representatives.
+  /// \throws Error where `pose` is not a pose
+  std::vector<PositionIkBranch> solve_all(const Pose& pose) const;
+
+  /// solve(pose) for `count` poses.
+  /// \param pose (B, 4, 4) in C order
+  /// \param q out: (B, n); NaN where the status is not Ok
+  /// \param status out: (B,); may be null
+  /// \param threads ≥ 1, the most that work at once; the answers do not depend on it
+  /// \throws Error where threads < 1
+  void solve_batch(std::size_t count, const double* pose, double* q, PositionIkStatus* status = nullptr,
+                   int threads = 1) const;
+
+  /// The arm.
+  const Chain& chain() const noexcept;
+  /// The settings, as given.
+  const PositionIkOptions& options() const noexcept;
+
+ private:
+  struct Model;
+  std::shared_ptr<const Model> model_;
+};
+
+SIGMAIK_SAME_LAYOUT(PositionIk, PositionIkOptions, PositionIkResult, PositionIkBranch);
+
+}  // namespace sigmaik
