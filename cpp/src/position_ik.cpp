@@ -26,18 +26,21 @@ using Clock = std::chrono::steady_clock;
 using detail::Branches;
 using detail::Descent;
 using detail::DescentPoint;
+using detail::Effort;
 using detail::require;
 using detail::StartOrder;
 
-constexpr int kQuick = 24;       // steps of a start
-constexpr int kPatient = 200;    // steps of the last descent, to the nearest pose
+constexpr Effort kQuick{24, 0.5, false};       // of a start
+constexpr Effort kLong{80, 0.95, false};       // of the best start of a block, and of the start from `near`
+constexpr Effort kPatient{200, 0.9999, true};  // of the last descent, to the nearest pose
+constexpr int kBlock = 16;                     // starts
 constexpr int kNearStarts = 48;  // starts of the table with which a search near a configuration looks for branches
-constexpr int kNearSteps = 60;   // steps of the start from `near`
 constexpr int kPulled = 8;       // solutions of a redundant arm that are moved towards `near`
 constexpr int kPulls = 40;       // steps of this
 constexpr int kPullsToMiddle = 100;
-constexpr double kApart = 1e-2;   // solutions differ by more than this in a joint [rad, or L]
-constexpr double kLargest = 1e9;  // of `near`: above, rounding exceeds 1e-7 rad
+constexpr double kApart = 1e-2;          // solutions differ by more than this in a joint [rad, or L]
+constexpr double kApartRedundant = 0.1;  // the same of a redundant arm's representatives
+constexpr double kLargest = 1e9;         // of `near`: above, rounding exceeds 1e-7 rad
 
 std::optional<AnalyticIk> closed_form(const Chain& chain) {
   try {
@@ -91,7 +94,8 @@ struct PositionIk::Model {
   Model(const Chain& arm, const PositionIkOptions& given)
       : chain(arm),
         options(checked(given)),
-        problem(arm, options.task, options.tolerance),
+        problem(arm, options.task, options.tolerance, true),
+        on_turn(arm, options.task, options.tolerance, false),
         middle(middle_of(arm.limits())),
         zero(JointVector::Zero(arm.dof()).cwiseMax(arm.limits().lower).cwiseMin(arm.limits().upper)),
         speed(speed_of(arm.limits())),
@@ -101,9 +105,10 @@ struct PositionIk::Model {
 
   Chain chain;
   PositionIkOptions options;
-  detail::DescentProblem problem;
-  JointVector middle, zero;  // of the joint ranges; 0, or the limit nearest to 0
-  JointVector speed, half;   // velocity limits; half of the ranges, π or 1 m where there is none
+  detail::DescentProblem problem;  // of a search for any solution
+  detail::DescentProblem on_turn;  // of a search near a configuration: every joint stays on its turn
+  JointVector middle, zero;        // of the joint ranges; 0, or the limit nearest to 0
+  JointVector speed, half;         // velocity limits; half of the ranges, π or 1 m where there is none
   detail::StartTable table;
   std::optional<AnalyticIk> analytic;
 
@@ -134,7 +139,7 @@ struct PositionIk::Model {
   void search_all(const Descent& search, const Pose& pose, int starts, Branches& out) const noexcept;
   bool search_first(const Descent& search, const Pose& pose, DescentPoint& best) const noexcept;
   double travel_time(const JointVector& q, const JointVector& near) const noexcept;
-  bool nearest(const Descent& search, Branches& found, const JointVector& near, DescentPoint& best) const noexcept;
+  bool nearest(const Descent& local, Branches& found, const JointVector& near, DescentPoint& best) const noexcept;
 };
 
 // The answer at a point, on the turns nearest to `near`.
@@ -171,22 +176,27 @@ void PositionIk::Model::search_all(const Descent& search, const Pose& pose, int 
   DescentPoint point;
   for (int i = 0; i < starts; ++i) {
     point.q = table.configuration(order.next());
-    if (search.run(point, kQuick, false)) out.add(point.q);
+    if (search.run(point, kQuick)) out.add(point.q);
   }
 }
 
-// The first solution that a descent finds, or the best point of all descents.
+// The first solution that a descent finds, or the best point of all descents. Most descents that give up are in a local
+// minimum at a limit; some were on the way to a solution, but slow. Hence the best of each block goes on for longer.
 bool PositionIk::Model::search_first(const Descent& search, const Pose& pose, DescentPoint& best) const noexcept {
   StartOrder order(table, pose);
-  DescentPoint point;
-  best.cost = detail::kInfinity;
-  for (int i = 0; i < options.starts; ++i) {
+  DescentPoint point, best_of_block;
+  best.cost = best_of_block.cost = detail::kInfinity;
+  for (int i = 1; i <= options.starts; ++i) {
     point.q = table.configuration(order.next());
-    const bool found = search.run(point, kQuick, false);
-    if (found || point.cost < best.cost) best = point;
-    if (found) return true;
+    const bool found = search.run(point, kQuick);
+    if (found || point.cost < best_of_block.cost) best_of_block = point;
+    if (!found && i % kBlock != 0 && i != options.starts) continue;
+    const bool reached = found || search.run(best_of_block, kLong);
+    if (reached || best_of_block.cost < best.cost) best = best_of_block;
+    if (reached) return true;
+    best_of_block.cost = detail::kInfinity;
   }
-  return search.run(best, kPatient, true);
+  return search.run(best, kPatient);
 }
 
 double PositionIk::Model::travel_time(const JointVector& q, const JointVector& near) const noexcept {
@@ -195,7 +205,7 @@ double PositionIk::Model::travel_time(const JointVector& q, const JointVector& n
 
 // The solution with the least travel time. Only the nearest few are moved along their self-motion: the others have too
 // far to go.
-bool PositionIk::Model::nearest(const Descent& search, Branches& found, const JointVector& near,
+bool PositionIk::Model::nearest(const Descent& local, Branches& found, const JointVector& near,
                                 DescentPoint& best) const noexcept {
   if (found.count() == 0) return false;
   for (JointVector& q : found) problem.place(near, q);
@@ -207,8 +217,8 @@ bool PositionIk::Model::nearest(const Descent& search, Branches& found, const Jo
   for (int i = 0; i < std::min(found.count(), kPulled); ++i) {
     DescentPoint point;
     point.q = found.begin()[i];
-    search.evaluate(point);
-    detail::pull(search, {near, speed, true}, kPulls, point);
+    local.evaluate(point);
+    detail::pull(local, {near, speed, true}, kPulls, point);
     problem.place(near, point.q);
     if (const double time = travel_time(point.q, near); time < least) {
       least = time;
@@ -247,18 +257,18 @@ PositionIkResult PositionIk::solve(const Pose& pose, const JointRef& near) const
   if (!is_pose(pose.matrix()) || near.size() != m.chain.dof() || !near.allFinite()) return {};
   if (near.cwiseAbs().maxCoeff() > kLargest) return {};
   const JointVector from = near;
-  const Descent search(m.problem, pose);
+  const Descent search(m.problem, pose), local(m.on_turn, pose);
   Branches found(m.problem, kApart);
   m.closed_form_branches(pose, &from, found);
   DescentPoint point;
   if (found.count() == 0) {
-    point.q = from.cwiseMax(m.problem.lower).cwiseMin(m.problem.upper);
-    if (search.run(point, kNearSteps, true)) found.add(point.q);
+    point.q = from.cwiseMax(m.on_turn.lower).cwiseMin(m.on_turn.upper);
+    if (local.run(point, kLong)) found.add(point.q);
     m.search_all(search, pose, std::min(kNearStarts, m.options.starts), found);
   }
-  if (!m.nearest(search, found, from, point) && m.search_first(search, pose, point)) {
+  if (!m.nearest(local, found, from, point) && m.search_first(search, pose, point)) {
     found.add(point.q);
-    m.nearest(search, found, from, point);
+    m.nearest(local, found, from, point);
   }
   return m.result(search, point, from, start);
 }
@@ -266,16 +276,17 @@ PositionIkResult PositionIk::solve(const Pose& pose, const JointRef& near) const
 std::vector<PositionIkBranch> PositionIk::solve_all(const Pose& pose) const {
   const Model& m = *model_;
   require(is_pose(pose.matrix()), "solve_all: the pose has an entry that is not finite, or its rotation is none");
-  const Descent search(m.problem, pose);
-  Branches found(m.problem, kApart), distinct(m.problem, kApart);
+  const Descent search(m.problem, pose), local(m.on_turn, pose);
+  Branches found(m.problem, kApart), distinct(m.problem, m.redundant() ? kApartRedundant : kApart);
   m.closed_form_branches(pose, nullptr, found);
   if (found.count() == 0) m.search_all(search, pose, m.options.starts, found);
   std::vector<PositionIkBranch> out;
   for (const JointVector& q : found) {
     DescentPoint point;
     point.q = q;
-    search.evaluate(point);
-    if (m.redundant()) detail::pull(search, {m.middle, m.half, false}, kPullsToMiddle, point);
+    m.problem.place(m.middle, point.q);
+    local.evaluate(point);
+    if (m.redundant()) detail::pull(local, {m.middle, m.half, false}, kPullsToMiddle, point);
     m.problem.place(m.middle, point.q);
     distinct.add(point.q);
   }

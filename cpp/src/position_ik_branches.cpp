@@ -5,10 +5,10 @@
 namespace sigmaik::detail {
 namespace {
 
-constexpr int kBack = 8;            // steps back to the pose after a step along the self-motion
-constexpr double kLongest = 1.0;    // of a step [rad]
-constexpr double kShortest = 1e-3;  // a step that is shorter than this, and no progress: the minimum [rad]
-constexpr double kProgress = 1e-4;  // part of the distance that a step must take away
+constexpr Effort kBack{8, 0.5, false};  // steps back to the pose after a step along the self-motion
+constexpr double kLongest = 1.0;        // of a step [rad]
+constexpr double kShortest = 1e-3;      // a step that is shorter than this, and no progress: the minimum [rad]
+constexpr double kProgress = 1e-7;      // part of the distance that a step must take away
 
 // Inverse weights of the joints, for min Σ (Δq_i − wish_i)²/w_i. For the largest distance these are the weights of
 // iteratively reweighted least squares for the sixth power: joints that have a shorter way give way to the others.
@@ -34,7 +34,7 @@ void pull(const Descent& search, const Pull& aim, int steps, DescentPoint& point
     const double length = d.cwiseAbs2().cwiseQuotient(problem.reach).cwiseSqrt().maxCoeff();
     const JointVector wish = std::min(1.0, longest / length) * d;
     next.q = search.self_motion(point, wish, inverse_weights(aim, d));
-    const bool back = search.run(next, kBack, false);
+    const bool back = search.run(next, kBack);
     const JointVector left = problem.difference(aim.to, next.q);
     const double now = aim.distance(left);
     if (back && now < (1.0 - kProgress) * distance) {

@@ -14,6 +14,8 @@ namespace {
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
 constexpr double kTurn = 2.0 * std::numbers::pi;
+constexpr double kDamping = 1e-2, kLeast = 1e-5, kMost = 1e6;  // of the damping over E: at the start, least, most
+constexpr double kGrowth = 8.0;  // of the damping after a step that is not accepted; then twice, four times, … this
 constexpr double kLeastDamping = 1e-13;  // part of the trace: keeps the factorisation positive at a singularity
 
 // Solves A x = b for a symmetric positive definite A, by A = L D Lᵀ. A's lower triangle becomes L and D.
@@ -49,7 +51,7 @@ Eigen::Matrix3d skew(const Eigen::Vector3d& x) noexcept {
 
 }  // namespace
 
-DescentProblem::DescentProblem(const Chain& arm, const Task& rows, const std::array<double, 2>& tolerances)
+DescentProblem::DescentProblem(const Chain& arm, const Task& rows, const std::array<double, 2>& tolerances, bool turns)
     : chain(arm),
       task(rows),
       whole(rows.whole()),
@@ -61,7 +63,10 @@ DescentProblem::DescentProblem(const Chain& arm, const Task& rows, const std::ar
   for (int i = 0; i < arm.dof(); ++i) {
     if (arm.joint_types()[static_cast<std::size_t>(i)] == JointType::Prismatic) {
       reach[i] = length * length;
-    } else if (upper[i] - lower[i] >= kTurn) {
+      continue;
+    }
+    const bool endless = std::isinf(lower[i]) && std::isinf(upper[i]);
+    if (endless || (turns && upper[i] - lower[i] >= kTurn)) {
       turning |= 1u << i;
       lower[i] = -kInfinity;
       upper[i] = kInfinity;
@@ -203,28 +208,38 @@ void Descent::polish(DescentPoint& point) const noexcept {
   }
 }
 
-bool Descent::run(DescentPoint& point, int iterations, bool patient) const noexcept {
+// In a curved valley, such as beside a singularity, a whole step leaves the valley's ground, and the next one comes
+// back far ahead. A descent that must be lower after every step creeps along the ground instead. Hence a step may be
+// worse than the last point, but not than all of the last three (Grippo, Lampariello and Lucidi, "A nonmonotone line
+// search technique for Newton's method", SIAM J. Numer. Anal. 23(4), 1986).
+bool Descent::run(DescentPoint& point, const Effort& effort) const noexcept {
   evaluate(point);
   DescentPoint next;
-  double damping = 1e-2;  // c, of λ = c E
+  double damping = kDamping, growth = kGrowth;  // λ = damping · E
+  double earlier[2] = {point.cost, point.cost};
   double before = point.cost;
   int since = 0;
-  for (int i = 0; i < iterations; ++i) {
+  for (int i = 0; i < effort.steps; ++i) {
     if (reached(point)) {
       polish(point);
       return true;
     }
     next.q = step(point, damping * point.cost, nullptr, problem_.reach);
     evaluate(next);
-    if (next.cost < point.cost) {
-      if (next.cost < 0.25 * point.cost) damping = std::max(0.2 * damping, 1e-5);
+    const double allowed = effort.always_lower ? point.cost : std::max({point.cost, earlier[0], earlier[1]});
+    if (next.cost < allowed) {
+      if (next.cost < 0.25 * point.cost) damping = std::max(0.2 * damping, kLeast);
+      growth = kGrowth;
+      earlier[0] = earlier[1];
+      earlier[1] = point.cost;
       point = next;
     } else {
-      damping *= 8.0;
-      if (damping > 1e6 || next.q == point.q) break;
+      if (damping > kMost || next.q == point.q) break;
+      damping *= growth;
+      growth *= 2.0;
     }
     if (++since == 4) {
-      if (point.cost > (patient ? 0.9999 : 0.5) * before) break;
+      if (point.cost > effort.progress * before) break;
       before = point.cost;
       since = 0;
     }

@@ -15,18 +15,19 @@ using Row6 = Eigen::Matrix<double, 6, 1>;
 
 // What the descents of one arm have in common.
 struct DescentProblem {
-  DescentProblem(const Chain& arm, const Task& rows, const std::array<double, 2>& tolerances);
+  // `turns`: joints whose range is a whole turn or more have no limits in the search, because whole turns bring any
+  // angle inside. Otherwise this is true of continuous joints alone.
+  DescentProblem(const Chain& arm, const Task& rows, const std::array<double, 2>& tolerances, bool turns);
 
   Chain chain;
   Task task;
   bool whole = true;                // all six rows are asked for
   std::array<double, 2> tolerance;  // [m], [rad]
   double length;                    // L [m]
-  // Limits of the search. A joint that may turn once or more has none: whole turns bring any angle inside its limits.
-  JointVector lower, upper;
+  JointVector lower, upper;         // limits of the search
   // Reach of a joint's step, squared: 1 rad, or L for a joint that slides. This keeps the steps independent of units.
   JointVector reach;
-  std::uint32_t turning = 0;  // bit i: joint i has no limits in the search, and turns
+  std::uint32_t turning = 0;  // bit i: joint i turns, and has no limits in the search
 
   // Puts each joint on the turn within its limits that is nearest to `near`.
   void place(const JointRef& near, JointVector& q) const noexcept;
@@ -43,6 +44,13 @@ struct DescentPoint {
   double cost;    // E = |residual|²
 };
 
+// When a descent gives up.
+struct Effort {
+  int steps;          // at most
+  double progress;    // a descent whose E falls by less than this factor in four steps is given up
+  bool always_lower;  // every step must make E smaller; otherwise smaller than one of the last three is enough
+};
+
 // A local search for one target.
 class Descent {
  public:
@@ -55,8 +63,7 @@ class Descent {
   bool reached(const DescentPoint& point) const noexcept;
 
   // Goes down from point.q, which must be inside the limits, and evaluates `point` there. Returns reached(point).
-  // `patient`: go on while there is any progress; otherwise give slow descents up early.
-  bool run(DescentPoint& point, int iterations, bool patient) const noexcept;
+  bool run(DescentPoint& point, const Effort& effort) const noexcept;
 
   // One step that keeps the error and takes q by `wish`, as far as the self-motion allows, with few joints' motion
   // where inverse_weight is small. The new configuration is inside the limits, and is not evaluated.
