@@ -42,7 +42,7 @@ namespace sigmaik {
 /// Settings of a PositionIk.
 struct PositionIkOptions {
   std::array<double, 2> tolerance{1e-6, 1e-6};  ///< [m], [rad] > 0: largest errors of position and orientation
-  Task task;                                    ///< rows of the pose error that matter
+  Task task{};                                  ///< rows of the pose error that matter
   int starts = 256;                             ///< in [1, 2048]: the most starts of a search
 };
 
