@@ -153,6 +153,7 @@ void bind_dynamics(py::module_& m);
 void bind_least_squares(py::module_& m);
 void bind_constrained_ik(py::module_& m);
 void bind_analytic_ik(py::module_& m);
+void bind_position_ik(py::module_& m);
 void bind_indices(py::module_& m);
 void bind_singularities(py::module_& m);
 

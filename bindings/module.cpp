@@ -82,6 +82,7 @@ PYBIND11_MODULE(_core, m) {
   bind_dynamics(m);
   bind_least_squares(m);
   bind_constrained_ik(m);
+  bind_position_ik(m);
   bind_indices(m);
   bind_singularities(m);
   bind_trajectory(m);

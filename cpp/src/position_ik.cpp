@@ -218,7 +218,7 @@ bool PositionIk::Model::nearest(const Descent& local, Branches& found, const Joi
     DescentPoint point;
     point.q = found.begin()[i];
     local.evaluate(point);
-    detail::pull(local, {near, speed, true}, kPulls, point);
+    detail::pull(local, {near, speed, true, 1e-4, kPulls}, point);
     problem.place(near, point.q);
     if (const double time = travel_time(point.q, near); time < least) {
       least = time;
@@ -286,7 +286,7 @@ std::vector<PositionIkBranch> PositionIk::solve_all(const Pose& pose) const {
     point.q = q;
     m.problem.place(m.middle, point.q);
     local.evaluate(point);
-    if (m.redundant()) detail::pull(local, {m.middle, m.half, false}, kPullsToMiddle, point);
+    if (m.redundant()) detail::pull(local, {m.middle, m.half, false, 1e-7, kPullsToMiddle}, point);
     m.problem.place(m.middle, point.q);
     distinct.add(point.q);
   }

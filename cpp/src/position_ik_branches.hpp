@@ -40,7 +40,9 @@ class Branches {
 struct Pull {
   const JointVector& to;
   const JointVector& unit;
-  bool largest;  // the distance is the largest joint's, as a travel time; otherwise the root of the sum of squares
+  bool largest;     // the distance is the largest joint's, as a travel time; otherwise the root of the sum of squares
+  double progress;  // a step that takes less than this part of the distance away is none
+  int steps;        // at most
 
   double distance(const JointVector& d) const noexcept {
     const auto parts = d.cwiseQuotient(unit).cwiseAbs();
@@ -49,6 +51,6 @@ struct Pull {
 };
 
 // Moves a solution along the self-motion to a local minimum of the distance. Every point on the way is a solution.
-void pull(const Descent& search, const Pull& aim, int steps, DescentPoint& point) noexcept;
+void pull(const Descent& search, const Pull& aim, DescentPoint& point) noexcept;
 
 }  // namespace sigmaik::detail
