@@ -150,9 +150,9 @@ void Descent::derivative(const DescentPoint& point, Columns& columns) const noex
 // Minimises |r − J Δq|² + λ Σ (Δq_i − wish_i)²/w_i inside the limits, through
 //   Δq = wish + W Jᵀ (J W Jᵀ + λ I)⁻¹ (r − J wish)
 // of the joints that are free. A joint that this takes beyond a limit is fixed at the limit, and the others are
-// computed again. The result is q + Δq.
+// computed again. The result is q + Δq; `expected` is E there if the arm were linear, as r − J Δq = λ (J W Jᵀ + λ I)⁻¹ r.
 JointVector Descent::step(const DescentPoint& point, double damping, const JointVector* wish,
-                          const JointVector& inverse_weight) const noexcept {
+                          const JointVector& inverse_weight, double& expected) const noexcept {
   const int n = static_cast<int>(point.q.size());
   Columns columns(6, n);
   derivative(point, columns);
@@ -181,7 +181,10 @@ JointVector Descent::step(const DescentPoint& point, double damping, const Joint
       beyond |= 1u << i;
       next[i] = next[i] < problem_.lower[i] ? problem_.lower[i] : problem_.upper[i];
     }
-    if (beyond == 0) return next;
+    if (beyond == 0) {
+      expected = lambda * lambda * y.squaredNorm();
+      return next;
+    }
     fixed |= beyond;
     for (int i = 0; i < n; ++i) {
       if ((beyond >> i & 1u) == 0) continue;
@@ -194,14 +197,16 @@ JointVector Descent::step(const DescentPoint& point, double damping, const Joint
 
 JointVector Descent::self_motion(const DescentPoint& point, const JointVector& wish,
                                  const JointVector& inverse_weight) const noexcept {
-  return step(point, 1e-9, &wish, inverse_weight);
+  double expected;
+  return step(point, 1e-9, &wish, inverse_weight, expected);
 }
 
 // The last step is cheap, and quadratic: from 1e-6 to rounding.
 void Descent::polish(DescentPoint& point) const noexcept {
   DescentPoint next;
+  double expected;
   for (int i = 0; i < 3 && point.cost > 1e-24; ++i) {
-    next.q = step(point, 0.0, nullptr, problem_.reach);
+    next.q = step(point, 0.0, nullptr, problem_.reach, expected);
     evaluate(next);
     if (!(next.cost < 0.25 * point.cost)) return;
     point = next;
@@ -224,11 +229,12 @@ bool Descent::run(DescentPoint& point, const Effort& effort) const noexcept {
       polish(point);
       return true;
     }
-    next.q = step(point, damping * point.cost, nullptr, problem_.reach);
+    double expected;
+    next.q = step(point, damping * point.cost, nullptr, problem_.reach, expected);
     evaluate(next);
     const double allowed = effort.always_lower ? point.cost : std::max({point.cost, earlier[0], earlier[1]});
     if (next.cost < allowed) {
-      if (next.cost < 0.25 * point.cost) damping = std::max(0.2 * damping, kLeast);
+      if (point.cost - next.cost > 0.75 * (point.cost - expected)) damping = std::max(0.2 * damping, kLeast);
       growth = kGrowth;
       earlier[0] = earlier[1];
       earlier[1] = point.cost;

@@ -78,7 +78,7 @@ class Descent {
 
  private:
   JointVector step(const DescentPoint& point, double damping, const JointVector* wish,
-                   const JointVector& inverse_weight) const noexcept;
+                   const JointVector& inverse_weight, double& expected) const noexcept;
   void polish(DescentPoint& point) const noexcept;
 
   const DescentProblem& problem_;
