@@ -30,10 +30,11 @@ using detail::Effort;
 using detail::require;
 using detail::StartOrder;
 
-constexpr Effort kQuick{24, 0.5, false};       // of a start
-constexpr Effort kLong{80, 0.95, false};       // of the best start of a block, and of the start from `near`
-constexpr Effort kPatient{200, 0.9999, true};  // of the last descent, to the nearest pose
-constexpr int kBlock = 16;                     // starts
+constexpr Effort kQuick{24, 0.5, false, false};      // of a start
+constexpr Effort kLong{80, 0.95, false, true};       // of the best start of a block
+constexpr Effort kPatient{200, 0.9999, true, true};  // of the last descent, to the nearest pose
+constexpr Effort kNear{60, 0.95, false, false};      // of the start from `near`
+constexpr int kBlock = 16;                           // starts
 constexpr int kNearStarts = 48;  // starts of the table with which a search near a configuration looks for branches
 constexpr int kPulled = 8;       // solutions of a redundant arm that are moved towards `near`
 constexpr int kPulls = 40;       // steps of this
@@ -263,7 +264,7 @@ PositionIkResult PositionIk::solve(const Pose& pose, const JointRef& near) const
   DescentPoint point;
   if (found.count() == 0) {
     point.q = from.cwiseMax(m.on_turn.lower).cwiseMin(m.on_turn.upper);
-    if (local.run(point, kLong)) found.add(point.q);
+    if (local.run(point, kNear) || local.run(point, kLong)) found.add(point.q);
     m.search_all(search, pose, std::min(kNearStarts, m.options.starts), found);
   }
   if (!m.nearest(local, found, from, point) && m.search_first(search, pose, point)) {

@@ -5,9 +5,9 @@
 namespace sigmaik::detail {
 namespace {
 
-constexpr Effort kBack{8, 0.5, false};  // steps back to the pose after a step along the self-motion
-constexpr double kLongest = 1.0;        // of a step [rad]
-constexpr double kShortest = 1e-3;      // a step that is shorter than this, and no progress: the minimum [rad]
+constexpr Effort kBack{8, 0.5, false, false};  // steps back to the pose after a step along the self-motion
+constexpr double kLongest = 1.0;               // of a step [rad]
+constexpr double kShortest = 1e-3;             // a step that is shorter than this, and no progress: the minimum [rad]
 
 // Inverse weights of the joints, for min Σ (Δq_i − wish_i)²/w_i. For the largest distance these are the weights of
 // iteratively reweighted least squares for the sixth power: joints that have a shorter way give way to the others.

@@ -150,7 +150,8 @@ void Descent::derivative(const DescentPoint& point, Columns& columns) const noex
 // Minimises |r − J Δq|² + λ Σ (Δq_i − wish_i)²/w_i inside the limits, through
 //   Δq = wish + W Jᵀ (J W Jᵀ + λ I)⁻¹ (r − J wish)
 // of the joints that are free. A joint that this takes beyond a limit is fixed at the limit, and the others are
-// computed again. The result is q + Δq; `expected` is E there if the arm were linear, as r − J Δq = λ (J W Jᵀ + λ I)⁻¹ r.
+// computed again. The result is q + Δq; `expected` is E there if the arm were linear, as r − J Δq = λ (J W Jᵀ + λ I)⁻¹
+// r.
 JointVector Descent::step(const DescentPoint& point, double damping, const JointVector* wish,
                           const JointVector& inverse_weight, double& expected) const noexcept {
   const int n = static_cast<int>(point.q.size());
@@ -230,7 +231,8 @@ bool Descent::run(DescentPoint& point, const Effort& effort) const noexcept {
       return true;
     }
     double expected;
-    next.q = step(point, damping * point.cost, nullptr, problem_.reach, expected);
+    next.q = effort.curved ? curved_step(point, damping * point.cost, expected)
+                           : step(point, damping * point.cost, nullptr, problem_.reach, expected);
     evaluate(next);
     const double allowed = effort.always_lower ? point.cost : std::max({point.cost, earlier[0], earlier[1]});
     if (next.cost < allowed) {

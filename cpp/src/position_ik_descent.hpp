@@ -49,6 +49,7 @@ struct Effort {
   int steps;          // at most
   double progress;    // a descent whose E falls by less than this factor in four steps is given up
   bool always_lower;  // every step must make E smaller; otherwise smaller than one of the last three is enough
+  bool curved;        // steps with the second derivatives of the pose: slower, for singular and unreachable targets
 };
 
 // A local search for one target.
@@ -79,6 +80,7 @@ class Descent {
  private:
   JointVector step(const DescentPoint& point, double damping, const JointVector* wish,
                    const JointVector& inverse_weight, double& expected) const noexcept;
+  JointVector curved_step(const DescentPoint& point, double damping, double& expected) const noexcept;
   void polish(DescentPoint& point) const noexcept;
 
   const DescentProblem& problem_;

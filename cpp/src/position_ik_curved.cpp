@@ -1,0 +1,102 @@
+// Newton steps of position_ik.hpp, with the second derivatives of the pose.
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include <Eigen/Cholesky>
+
+#include "position_ik_descent.hpp"
+
+namespace sigmaik::detail {
+namespace {
+
+// ½ of the second derivative of E, in units of `scale` of each joint. The second derivative of the orientation error is
+// that of a small one: the symmetric part of ∂ω_l/∂q_k.
+JointMatrix curvature(const DescentPoint& point, const Descent::Columns& columns, const JointVector& scale,
+                      double length) noexcept {
+  const Eigen::Index n = columns.cols();
+  JacobianGradient gradient;
+  jacobian_gradient(point.state.jacobian, gradient);
+  const Eigen::Vector3d linear = point.residual.head<3>() / length, angular = 0.5 * point.residual.tail<3>();
+  JointMatrix h(n, n);
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const Jacobian& of_k = gradient[static_cast<std::size_t>(k)];
+    for (Eigen::Index l = 0; l <= k; ++l) {
+      const Jacobian& of_l = gradient[static_cast<std::size_t>(l)];
+      const double bend = linear.dot(of_k.col(l).head<3>()) +
+                          angular.dot(of_k.col(l).tail<3>() + of_l.col(k).tail<3>());
+      h(k, l) = h(l, k) = columns.col(k).dot(columns.col(l)) - scale[k] * scale[l] * bend;
+    }
+  }
+  return h;
+}
+
+// The rows and columns of h that are free, with λ on the diagonal, factorised. λ grows until the matrix is positive.
+Eigen::LLT<JointMatrix> factor(const JointMatrix& h, const std::array<int, kMaxJoints>& free, int count,
+                               double& lambda) noexcept {
+  JointMatrix part(count, count);
+  Eigen::LLT<JointMatrix> out(count);
+  for (;;) {
+    for (int i = 0; i < count; ++i) {
+      for (int j = 0; j < count; ++j) {
+        part(i, j) = h(free[static_cast<std::size_t>(i)], free[static_cast<std::size_t>(j)]) + (i == j ? lambda : 0.0);
+      }
+    }
+    out.compute(part);
+    if (out.info() == Eigen::Success) return out;
+    lambda *= 4.0;
+  }
+}
+
+}  // namespace
+
+// Minimises the quadratic model of E plus λ |Δq|²_W inside the limits, by the active set of step(). The method of
+// Levenberg and Marquardt leaves the second derivatives out, which is right where the error goes to zero quickly. At a
+// singularity the second derivatives are what moves the tip along the lost direction, and at a pose out of reach the
+// error does not go to zero.
+JointVector Descent::curved_step(const DescentPoint& point, double damping, double& expected) const noexcept {
+  const int n = static_cast<int>(point.q.size());
+  const JointVector scale = problem_.reach.cwiseSqrt();
+  Columns columns(6, n);
+  derivative(point, columns);
+  for (int i = 0; i < n; ++i) columns.col(i) *= scale[i];
+  const JointMatrix h = curvature(point, columns, scale, problem_.length);
+  const JointVector slope = columns.transpose() * point.residual;
+  double lambda = damping + 1e-13 * std::max(columns.squaredNorm(), 1e-280);
+
+  JointVector move = JointVector::Zero(n), next = point.q;  // `move` in units of `scale`
+  std::uint32_t fixed = 0;
+  for (;;) {
+    std::array<int, kMaxJoints> free;
+    int count = 0;
+    for (int i = 0; i < n; ++i) {
+      if ((fixed >> i & 1u) == 0) free[static_cast<std::size_t>(count++)] = i;
+    }
+    if (count == 0) break;
+    JointVector right(count);
+    for (int i = 0; i < count; ++i) {
+      const int joint = free[static_cast<std::size_t>(i)];
+      right[i] = slope[joint];
+      for (int k = 0; k < n; ++k) {
+        if ((fixed >> k & 1u) != 0) right[i] -= h(joint, k) * move[k];
+      }
+    }
+    const JointVector z = factor(h, free, count, lambda).solve(right);
+    bool inside = true;
+    for (int i = 0; i < count; ++i) {
+      const int joint = free[static_cast<std::size_t>(i)];
+      const double wanted = point.q[joint] + scale[joint] * z[i];
+      next[joint] = std::clamp(wanted, problem_.lower[joint], problem_.upper[joint]);
+      move[joint] = (next[joint] - point.q[joint]) / scale[joint];
+      if (next[joint] == wanted) continue;
+      fixed |= 1u << joint;
+      inside = false;
+    }
+    if (inside) break;
+  }
+  expected = point.cost - 2.0 * slope.dot(move) + move.dot(h * move);
+  return next;
+}
+
+}  // namespace sigmaik::detail
