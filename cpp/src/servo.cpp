@@ -6,6 +6,7 @@
 
 #include <sigmaik/pose.hpp>
 
+#include "guide.hpp"
 #include "finite.hpp"
 #include "length.hpp"
 #include "message.hpp"
@@ -37,6 +38,9 @@ void check_joints(const char* what, const JointRef& values, const Chain& chain) 
 
 // [rad or m] A following error that changes by more while the reference rests comes from outside.
 constexpr double kMoved = 1e-3;
+
+// [1/s] towards the posture of the guide. The servo's own way must not end before the arm has taken this posture.
+constexpr double kGuidedPostureGain = 5.0;
 
 // [s] time constant of measure(): a hundred cycles of noise, and several times the lag of a joint's controller.
 constexpr double kMeasuringTime = 0.1;
@@ -95,6 +99,7 @@ Servo::Servo(Chain chain, const Method& method, const ServoOptions& options)
   }
   solver_.set_pace(pace_of(tracker_, solver_.length_scale()));
   following_error_ = expected_error_ = JointVector::Zero(chain_.dof());
+  if (options.guided) guide_ = detail::GuideOwner(std::make_unique<detail::Guide>(*this));
 }
 
 void Servo::reset(const JointRef& q, const JointRef& qdot, const JointRef& qddot) {
@@ -120,6 +125,7 @@ void Servo::begin(const JointRef& posture) noexcept {
   sigmaik::update(chain_, tracker_.q(), state_);
   fade_ = 0.0;
   expect_motion();
+  forget_guide();
   following_error_.setZero();
   expected_error_.setZero();
   measured_ = false;
@@ -154,15 +160,18 @@ void Servo::continue_from(const Servo& other) {
 
 void Servo::set_method(const Method& method) {
   solver_.set_method(method);
+  if (guide_) guide_->set_method(method);
   expect_motion();  // the new rule may do what the last one could not
 }
 
 JointVector Servo::posture_velocity() const noexcept {
   JointVector velocity;
-  if (options_.posture_gain != 0.0) {
+  const bool guided = guided_posture_.size() != 0;
+  const double gain = guided ? kGuidedPostureGain : options_.posture_gain;
+  if (gain != 0.0) {
     const double cap = options_.posture_max_speed;
-    velocity = (options_.posture_gain * (nominal_ - tracker_.q())).cwiseMax(-cap).cwiseMin(cap);
-    velocity *= tracker_.arrival(velocity, options_.posture_gain);
+    velocity = (gain * ((guided ? guided_posture_ : nominal_) - tracker_.q())).cwiseMax(-cap).cwiseMin(cap);
+    velocity *= tracker_.arrival(velocity, gain);
   }
   if (!avoidance_.active()) return velocity;
   const JointVector away = avoidance_.velocity(tracker_.q());
@@ -187,8 +196,13 @@ ServoStep Servo::update(const Pose& target, const Twist& feedforward) noexcept {
   twist.head<3>() *= options_.gain_linear;
   twist.tail<3>() *= options_.gain_angular;
   twist += feedforward;
-  ServoStep step = resolve(twist, &feedforward, true);
+  const JointVector* goal = guide_ && tracker_.q().size() != 0 ? ask_guide(target, error) : nullptr;
+  ServoStep step = resolve(twist, &feedforward, true, goal);
   step.pose_error = error;
+  if (guide_) {
+    step.guide = guide_->state();
+    step.guide_joints = guide_->joints();
+  }
   watch(target, step);
   return step;
 }
@@ -211,11 +225,26 @@ void Servo::watch(const Pose& target, ServoStep& step) noexcept {
 ServoStep Servo::update_twist(const Twist& twist) noexcept {
   if (!detail::finite(twist)) return stop(Status::BadInput);
   expect_motion();
-  return resolve(twist, nullptr, qdot_start_.size() != 0 && !qdot_start_.isZero(0.0));
+  forget_guide();
+  return resolve(twist, nullptr, qdot_start_.size() != 0 && !qdot_start_.isZero(0.0), nullptr);
 }
 
-// `feedforward`: null for a twist command, which has nowhere to arrive.
-ServoStep Servo::resolve(const Twist& twist, const Twist* feedforward, bool fade) noexcept {
+// A slice of the guide's work. Returns where the joints go; null: the servo goes its own way.
+const JointVector* Servo::ask_guide(const Pose& target, const Twist& error) noexcept {
+  guide_->advise(target, error, *this);
+  const JointVector* posture = guide_->posture();
+  guided_posture_ = posture != nullptr ? *posture : JointVector();
+  return guide_->goal();
+}
+
+void Servo::forget_guide() noexcept {
+  if (!guide_) return;
+  guide_->forget();
+  guided_posture_.resize(0);
+}
+
+// `feedforward`: null for a twist command, which has nowhere to arrive. `goal`: null, or where the guide leads to.
+ServoStep Servo::resolve(const Twist& twist, const Twist* feedforward, bool fade, const JointVector* goal) noexcept {
   if (tracker_.q().size() == 0) return stop(Status::BadInput);
   const Eigen::Matrix3d& rotation = state_.tip.linear();
   const JointVector posture = posture_velocity();
@@ -237,7 +266,10 @@ ServoStep Servo::resolve(const Twist& twist, const Twist* feedforward, bool fade
 
   bool rule = feedforward == nullptr || !arrive(*feedforward, step.qdot);  // the rule's answer stands
   if (fade_in(step.qdot, fade)) rule = false;
-  if (tracker_.has_jerk() || !tracker_.bounds().contain(step.qdot)) {
+  if (goal != nullptr) {
+    lead(*goal, step);
+    rule = false;
+  } else if (tracker_.has_jerk() || !tracker_.bounds().contain(step.qdot)) {
     limit(step);
     rule = false;
   }

@@ -64,7 +64,7 @@ void Servo::limit(ServoStep& step) noexcept {
   const JointVector asked = step.qdot;
   slow_down(step);
   head(step);
-  approach(step);
+  approach(step, options_.on_limit == OnLimit::Redistribute);
   judge(asked, step);
 }
 
@@ -93,7 +93,8 @@ void Servo::head(ServoStep& step) noexcept {
 }
 
 // Acceleration and jerk limits: the command becomes the part of the way to the heading that fits into this cycle.
-void Servo::approach(ServoStep& step) noexcept {
+// `redistributes`: where one joint must brake as hard as it can, the other joints do as much of the twist as possible.
+void Servo::approach(ServoStep& step, bool redistributes) noexcept {
   const VelocityBounds& bounds = tracker_.bounds();
   if (tracker_.has_jerk()) {
     const JointVector wanted = step.qdot;
@@ -108,10 +109,26 @@ void Servo::approach(ServoStep& step) noexcept {
   }
   if (bounds.contain(step.qdot)) return;
   step.qdot = furthest(tracker_.qdot(), step.qdot, bounds, step.limiting_joints);
-  if (options_.on_limit == OnLimit::Redistribute && !bounds.contain(step.qdot)) {
+  if (redistributes && !bounds.contain(step.qdot)) {
     step.qdot = redistribute(step.qdot, bounds, step);
   }
   step.qdot = step.qdot.cwiseMax(bounds.lower).cwiseMin(bounds.upper);
+}
+
+// Instead of the rule's answer: straight to joint positions, all joints in proportion, so that they stop there.
+void Servo::lead(const JointVector& goal, ServoStep& step) noexcept {
+  const JointVector asked = step.qdot;
+  const double gain = solver_.length_scale() / solver_.pace().lag;  // no singularity delays joints by themselves
+  step.qdot = gain * (goal - tracker_.q());
+  step.qdot *= tracker_.arrival(step.qdot, gain);
+  double part = 1.0;
+  for (int i = 0; i < chain_.dof(); ++i) {
+    const double size = std::abs(step.qdot[i]), limit = tracker_.velocity_limit(i);
+    if (size * part > limit) part = limit / size;
+  }
+  step.qdot *= part;
+  approach(step, false);
+  judge(asked, step);
 }
 
 // Measures how much of the rule's twist is left, along this twist and in the weights of the rule, and whether any is

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <limits>
+#include <memory>
 #include <optional>
 
 #include <sigmaik/avoidance.hpp>
@@ -61,7 +62,41 @@ struct ServoOptions {
   std::array<bool, 6> exact{};
   std::optional<double> length_scale{};  ///< [m], see VelocitySolver; none: Chain::characteristic_length()
   Task task{};                           ///< which rows of the twist matter, and in which axes
+  /// Whether the servo takes another way to a pose target that rests where its own way does not arrive; see Servo.
+  bool guided = false;
 };
+
+/// What the guide of a servo does (ServoOptions::guided), for the pose target at hand.
+enum class GuideState : std::int8_t {
+  Off = 0,             ///< there is no guide, or no pose target
+  Direct = 1,          ///< the servo goes its own way
+  Searching = 2,       ///< the servo's own way does not arrive; the guide looks for another, meanwhile the servo goes on
+  Posture = 3,         ///< the tool goes its own way, and the arm's self-motion leads to another configuration
+  ChangingBranch = 4,  ///< the joints go straight to positions at which the tool is at the target: the tool leaves its way
+  Unreachable = 5,     ///< no joint positions were found; the servo goes as near as its own way leads
+};
+
+/// "off", "direct", "searching", "posture", "changing branch", "unreachable".
+const char* to_string(GuideState state) noexcept;
+
+namespace detail {
+class Guide;
+// Owns a guide, which is copied with its servo.
+class GuideOwner {
+ public:
+  GuideOwner() noexcept;
+  explicit GuideOwner(std::unique_ptr<Guide> guide) noexcept;
+  GuideOwner(const GuideOwner& other);
+  GuideOwner(GuideOwner&& other) noexcept;
+  GuideOwner& operator=(GuideOwner other) noexcept;
+  ~GuideOwner();
+  Guide* operator->() const noexcept { return guide_.get(); }
+  explicit operator bool() const noexcept { return guide_ != nullptr; }
+
+ private:
+  std::unique_ptr<Guide> guide_;
+};
+}  // namespace detail
 
 /// Answer of a cycle. By value, no heap.
 struct ServoStep {
@@ -84,6 +119,10 @@ struct ServoStep {
   /// The target has rested for longer than any motion of the arm takes (Servo::settling_time()), and the arm still
   /// moves, by more than 1e-3 of a velocity limit: the motion is being faded out.
   bool not_settling = false;
+  GuideState guide = GuideState::Off;  ///< what the guide does
+  /// Bit i: by the way that the guide has taken, joint i ends more than 0.5 rad (prismatic: half of the characteristic
+  /// length) from where the servo's own way leads.
+  std::uint16_t guide_joints = 0;
 };
 
 /// Drives a chain's own reference configuration towards poses, or along twists. A servo integrates the command that it
@@ -189,10 +228,13 @@ class Servo {
   double settling_time() const noexcept { return tracker_.settling_time(); }
 
  private:
+  friend class detail::Guide;  // predicts with a servo of its own
   void begin(const JointRef& posture) noexcept;
   ServoStep stop(Status status) noexcept;
-  ServoStep resolve(const Twist& twist, const Twist* feedforward, bool fade) noexcept;
+  ServoStep resolve(const Twist& twist, const Twist* feedforward, bool fade, const JointVector* goal) noexcept;
   JointVector posture_velocity() const noexcept;
+  const JointVector* ask_guide(const Pose& target, const Twist& error) noexcept;
+  void forget_guide() noexcept;
   bool fade_in(JointVector& qdot, bool fade) noexcept;
   void take(ServoStep& step, bool achieved) noexcept;
   void watch(const Pose& target, ServoStep& step) noexcept;
@@ -213,7 +255,8 @@ class Servo {
   // servo_limits.cpp
   void limit(ServoStep& step) noexcept;
   void head(ServoStep& step) noexcept;
-  void approach(ServoStep& step) noexcept;
+  void approach(ServoStep& step, bool redistributes) noexcept;
+  void lead(const JointVector& goal, ServoStep& step) noexcept;
   void judge(const JointVector& asked, ServoStep& step) const noexcept;
 
   // servo_redistribution.cpp
@@ -241,6 +284,8 @@ class Servo {
   double max_linear_error_;
   double fade_ = 1.0, rested_ = 0.0;
   bool measured_ = false;
+  JointVector guided_posture_;  // the posture that the guide has given; empty: none
+  detail::GuideOwner guide_;    // null: not guided
 };
 
 SIGMAIK_SAME_LAYOUT(Servo, ServoOptions, ServoStep);

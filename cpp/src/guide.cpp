@@ -1,0 +1,223 @@
+#include "guide.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include <sigmaik/pose.hpp>
+
+namespace sigmaik {
+
+const char* to_string(GuideState state) noexcept {
+  switch (state) {
+    case GuideState::Off: return "off";
+    case GuideState::Direct: return "direct";
+    case GuideState::Searching: return "searching";
+    case GuideState::Posture: return "posture";
+    case GuideState::ChangingBranch: return "changing branch";
+    case GuideState::Unreachable: return "unreachable";
+  }
+  return "unknown";
+}
+
+namespace detail {
+
+GuideOwner::GuideOwner() noexcept = default;
+GuideOwner::GuideOwner(std::unique_ptr<Guide> guide) noexcept : guide_(std::move(guide)) {}
+GuideOwner::GuideOwner(const GuideOwner& other)
+    : guide_(other.guide_ != nullptr ? std::make_unique<Guide>(*other.guide_) : nullptr) {}
+GuideOwner::GuideOwner(GuideOwner&& other) noexcept = default;
+GuideOwner& GuideOwner::operator=(GuideOwner other) noexcept {
+  guide_ = std::move(other.guide_);
+  return *this;
+}
+GuideOwner::~GuideOwner() = default;
+
+namespace {
+
+constexpr double kStep = 4e-3;      // [s] of a predicted cycle: the servo's thresholds are still those of its own cycle
+constexpr double kAhead = 32.0;     // [s] of predicted motion in a second, so that a prediction takes a tenth of a second
+constexpr double kQuiet = 0.02;     // [s] for which a target has to rest: a hand that drags it gets no prediction
+constexpr double kSame = 1e-3;      // [rad, or L] a target that moves by less is the same
+constexpr double kArrived = 1e-3;   // [L] of the position
+constexpr double kTurned = 2.5e-3;  // [rad] of the orientation
+constexpr double kPatience = 4.5;   // [s] that the servo's own way may take,
+constexpr double kLonger = 1.4;     // and this many times the joints' travel time
+constexpr double kStill = 0.2;      // [s] of rest that end a prediction
+constexpr double kStuck = 0.4;      // [s] of the prediction, in which the error has to fall
+constexpr double kProgress = 0.05;  // by this part of itself, or the servo is in a valley
+constexpr double kLate = 1.3;       // of the predicted time, until the servo counts as stuck,
+constexpr double kLateness = 0.3;   // [s] and this time more
+constexpr double kLed = 1e-4;       // [rad or m] from the goal: the joints are there
+constexpr double kAway = 1.0;       // [s] away from a target where the arm had arrived: somebody moved the arm
+constexpr double kOther = 0.5;      // [rad, or L] a joint that ends farther from the servo's own way changes its branch
+
+ServoOptions of_predictor(const Servo& servo) {
+  ServoOptions options = servo.options();
+  options.dt = std::max(options.dt, kStep);
+  options.guided = false;
+  return options;
+}
+
+PositionIkOptions of_search(const Servo& servo) {
+  PositionIkOptions options;
+  options.task = servo.options().task;
+  return options;
+}
+
+}  // namespace
+
+Guide::Guide(const Servo& servo)
+    : predictor_(servo.chain(), servo.method(), of_predictor(servo)), ik_(servo.chain(), of_search(servo)) {}
+
+void Guide::set_method(const Method& method) {
+  predictor_.set_method(method);
+  forget();
+}
+
+void Guide::begin(const Pose& target) noexcept {
+  target_ = target;
+  phase_ = Phase::Waiting;
+  state_ = GuideState::Direct;
+  searched_ = with_posture_ = false;
+  joints_ = 0;
+  time_ = away_ = 0.0;
+}
+
+bool Guide::arrived(const Twist& error, const Servo& servo) const noexcept {
+  const Task& task = servo.options().task;
+  const Eigen::Matrix3d rotation = servo.tip().linear();
+  const Twist rows = task.whole() ? error : expand_rows(task, rotation, select_rows(task, rotation, error));
+  return rows.head<3>().norm() <= kArrived * ik_.chain().characteristic_length() && rows.tail<3>().norm() <= kTurned;
+}
+
+void Guide::advise(const Pose& target, const Twist& error, const Servo& servo) noexcept {
+  const Twist moved = pose_error(target_, target);
+  const double length = ik_.chain().characteristic_length();
+  if (phase_ == Phase::Nothing || moved.head<3>().norm() > kSame * length || moved.tail<3>().norm() > kSame) {
+    begin(target);
+  }
+  time_ += servo.options().dt;
+  switch (phase_) {
+    case Phase::Waiting:
+      if (time_ >= kQuiet) start_prediction(servo, false);
+      break;
+    case Phase::Predicting: predict(servo); break;
+    case Phase::Searching: search(servo); break;
+    case Phase::Following:
+      if (arrived(error, servo)) {
+        phase_ = Phase::Done;
+      } else if (time_ > kLate * predicted_ + kLateness || stuck(error, servo.options().dt)) {
+        end_ = servo.q();
+        phase_ = Phase::Searching;
+        if (searched_) choose_lead(servo);
+      }
+      break;
+    case Phase::Leading:
+      if ((goal_ - servo.q()).cwiseAbs().maxCoeff() <= kLed) {
+        phase_ = Phase::Done;
+        state_ = GuideState::Direct;
+      }
+      break;
+    case Phase::Done:
+      away_ = arrived(error, servo) || state_ == GuideState::Unreachable ? 0.0 : away_ + servo.options().dt;
+      if (away_ > kAway) begin(target);
+      break;
+    case Phase::Nothing: break;
+  }
+}
+
+void Guide::start_prediction(const Servo& servo, bool with_posture) noexcept {
+  phase_ = Phase::Predicting;
+  with_posture_ = with_posture;
+  predictor_.guided_posture_ = with_posture ? goal_ : JointVector();
+  predictor_.reset(servo.q(), servo.qdot());
+  predicted_ = 0.0;
+  start_way();
+  horizon_ = std::max(kPatience, searched_ ? kLonger * travel_time(servo.q()) : 0.0);
+}
+
+// Whether the error has not fallen for a while.
+bool Guide::stuck(const Twist& error, double dt) noexcept {
+  const double left = error.head<3>().norm() / ik_.chain().characteristic_length() + error.tail<3>().norm();
+  since_least_ += dt;
+  if (left < (1.0 - kProgress) * least_) {
+    least_ = left;
+    since_least_ = 0.0;
+  }
+  return since_least_ > kStuck;
+}
+
+void Guide::start_way() noexcept {
+  time_ = still_ = since_least_ = 0.0;
+  least_ = std::numeric_limits<double>::infinity();
+}
+
+Guide::Outcome Guide::run_prediction() noexcept {
+  const ServoStep step = predictor_.update(target_);
+  const double dt = predictor_.options().dt;
+  if (arrived(step.pose_error, predictor_)) return Outcome::Arrives;
+  predicted_ += dt;
+  if (stuck(step.pose_error, dt)) return Outcome::Rests;
+  still_ = step.qdot.isZero(0.0) || predictor_.tracker_.resting() ? still_ + dt : 0.0;
+  return still_ > kStill ? Outcome::Rests : Outcome::Open;
+}
+
+void Guide::predict(const Servo& servo) noexcept {
+  const int steps = std::max(1, static_cast<int>(kAhead * servo.options().dt / predictor_.options().dt));
+  for (int i = 0; i < steps; ++i) {
+    const Outcome outcome = run_prediction();
+    if (outcome == Outcome::Arrives) {
+      phase_ = Phase::Following;
+      state_ = with_posture_ ? GuideState::Posture : GuideState::Direct;
+      start_way();
+      return;
+    }
+    if (outcome == Outcome::Open && predicted_ < horizon_) continue;
+    if (with_posture_) return choose_lead(servo);
+    end_ = predictor_.q();
+    phase_ = Phase::Searching;
+    state_ = GuideState::Searching;
+    return;
+  }
+}
+
+void Guide::search(const Servo& servo) noexcept {
+  const PositionIkResult found = ik_.solve(target_, servo.q());
+  if (found.status != PositionIkStatus::Ok) {
+    phase_ = Phase::Done;
+    state_ = GuideState::Unreachable;
+    return;
+  }
+  goal_ = found.q;
+  searched_ = true;
+  if (ik_.chain().dof() > servo.options().task.rows()) return start_prediction(servo, true);
+  choose_lead(servo);
+}
+
+void Guide::choose_lead(const Servo& servo) noexcept {
+  with_posture_ = false;
+  phase_ = Phase::Leading;
+  state_ = GuideState::ChangingBranch;
+  joints_ = 0;
+  for (int i = 0; i < servo.chain().dof(); ++i) {
+    const bool slides = servo.chain().joint_types()[static_cast<std::size_t>(i)] == JointType::Prismatic;
+    const double unit = slides ? servo.chain().characteristic_length() : 1.0;
+    if (std::abs(goal_[i] - end_[i]) > kOther * unit) joints_ |= static_cast<std::uint16_t>(1u << i);
+  }
+}
+
+// Of a motion that starts and ends at rest.
+double Guide::travel_time(const JointVector& from) const noexcept {
+  double longest = 0.0;
+  for (int i = 0; i < from.size(); ++i) {
+    const double way = std::abs(goal_[i] - from[i]);
+    const double v = predictor_.tracker_.velocity_limit(i), a = predictor_.tracker_.acceleration_limit(i);
+    longest = std::max(longest, way > v * v / a ? way / v + v / a : 2.0 * std::sqrt(way / a));
+  }
+  return longest;
+}
+
+}  // namespace detail
+}  // namespace sigmaik
