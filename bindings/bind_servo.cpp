@@ -1,3 +1,5 @@
+#include <pybind11/native_enum.h>
+
 #include "servo_options.hpp"
 
 namespace sigmaik::bindings {
@@ -20,6 +22,22 @@ auto once_started(Get get) {
     require_started(servo);
     return to_numpy(get(servo));
   };
+}
+
+void bind_guide_state(py::module_& m) {
+  py::native_enum<GuideState>(m, "GuideState", "enum.IntEnum",
+                              "What the guide of a Servo does for the pose target at hand (guided=True).")
+      .value("OFF", GuideState::Off, "there is no guide, or no pose target")
+      .value("DIRECT", GuideState::Direct, "the servo goes its own way")
+      .value("SEARCHING", GuideState::Searching,
+             "the servo's own way does not arrive, and the guide looks for another; the servo goes on meanwhile")
+      .value("POSTURE", GuideState::Posture,
+             "the tool goes its own way, and the arm's self-motion leads to another configuration")
+      .value("CHANGING_BRANCH", GuideState::ChangingBranch,
+             "the joints go straight to a configuration that has the tool at the target: the tool leaves its way")
+      .value("UNREACHABLE", GuideState::Unreachable,
+             "no configuration was found; the servo goes as near as its own way leads")
+      .finalize();
 }
 
 void bind_step(py::module_& m) {
@@ -64,6 +82,11 @@ void bind_step(py::module_& m) {
       .def_readonly("not_settling", &ServoStep::not_settling,
                     "The target has rested for longer than any motion takes (Servo.settling_time), and the arm still "
                     "moves.")
+      .def_readonly("guide", &ServoStep::guide, "What the guide does, see GuideState.")
+      .def_property_readonly(
+          "guide_joints", [](const ServoStep& s) { return indices(s.guide_joints); },
+          "Indices of the joints that end elsewhere by the guide's way than by the servo's own: by more than 0.5 rad, "
+          "or half of the characteristic length.")
       .def("__repr__", [](const ServoStep& s) {
         return std::string("ServoStep(status=") + to_string(s.status) +
                ", qdot=" + py::str(to_numpy(s.qdot)).cast<std::string>() + ")";
@@ -176,6 +199,7 @@ void bind_state(py::class_<Servo>& c) {
 }  // namespace
 
 void bind_servo(py::module_& m) {
+  bind_guide_state(m);
   bind_step(m);
   py::class_<Servo> c(
       m, "Servo",

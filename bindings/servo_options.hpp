@@ -99,6 +99,10 @@ struct Fields<ServoOptions> {
       field("length_scale", &ServoOptions::length_scale,
             "[m] > 0: 1 rad/s weighs as much as length_scale m/s, as for VelocitySolver. None: "
             "chain.characteristic_length."),
+      field("guided", &ServoOptions::guided,
+            "whether the servo takes another way to a pose target that rests where its own way does not arrive: "
+            "through another configuration of the arm, if need be away from the tool's straight line. `step.guide` "
+            "says so. Arrives at each target that PositionIk finds."),
       nested(&ServoOptions::task),
   };
 };

@@ -10,7 +10,7 @@ import os
 import pathlib
 import sigmaik.planning.status
 import typing
-__all__: list[str] = ['AdaptiveDampedLeastSquares', 'AnalyticBranch', 'AnalyticIk', 'ArgumentError', 'ArmSpheres', 'CartError', 'CartMeasures', 'CartMotion', 'CartRegion', 'Chain', 'Clearance', 'ComputedTorque', 'ComputedTorqueStep', 'ConstrainedIk', 'ConstrainedIkStep', 'Crossing', 'DEFAULT_SCALE', 'DampedLeastSquares', 'DistanceField', 'Dynamics', 'Error', 'Inertia', 'JParse', 'JacobianProjection', 'JacobianSafety', 'JacobianSafetyProjection', 'JointCost', 'JointLimits', 'LeastSquaresSolution', 'LoopCommand', 'LoopStatistics', 'Method', 'ModelWarning', 'PlaneCartMotion', 'Playback', 'PseudoInverse', 'SampleCounts', 'SampleStatus', 'Segment', 'SelectivelyDampedLeastSquares', 'Servo', 'ServoLoop', 'ServoStep', 'SingularSets', 'Solution', 'Spectrum', 'Status', 'StreamStatus', 'Target', 'TargetStream', 'TimeOptimal', 'TimeOptimalResult', 'Trajectory', 'VelocitySolver', 'admissible_guess', 'cart_descent', 'cart_motion', 'cart_motion_by_descent', 'clearance', 'collision_cost', 'draw_from_prior', 'evaluate_cart_motion', 'evaluate_cart_motion_plane', 'evaluate_index', 'forbidden_intervals', 'geometry_aware_cost', 'index_of_jacobian', 'joint_limit_cost', 'known_singular_sets', 'least_squares', 'load_singular_sets', 'log_manipulability_cost', 'manipulability_cost', 'min_distance', 'plan_gradient', 'plan_stochastic', 'plane_cart_motion', 'planner_options', 'play', 'pose_error', 'potential_cost', 'reference_scale', 'rotation_exp', 'rotation_log', 'rules', 'scaled_cost', 'self_collision_cost', 'self_collision_pairs', 'singular_sets_of', 'solve_batch', 'spline_velocities', 'sum_of_costs', 'taut_string']
+__all__: list[str] = ['AdaptiveDampedLeastSquares', 'AnalyticBranch', 'AnalyticIk', 'ArgumentError', 'ArmSpheres', 'CartError', 'CartMeasures', 'CartMotion', 'CartRegion', 'Chain', 'Clearance', 'ComputedTorque', 'ComputedTorqueStep', 'ConstrainedIk', 'ConstrainedIkStep', 'Crossing', 'DEFAULT_SCALE', 'DampedLeastSquares', 'DistanceField', 'Dynamics', 'Error', 'GuideState', 'Inertia', 'JParse', 'JacobianProjection', 'JacobianSafety', 'JacobianSafetyProjection', 'JointCost', 'JointLimits', 'LeastSquaresSolution', 'LoopCommand', 'LoopStatistics', 'Method', 'ModelWarning', 'PlaneCartMotion', 'Playback', 'PositionIk', 'PositionIkBranch', 'PositionIkResult', 'PositionIkStatus', 'PseudoInverse', 'SampleCounts', 'SampleStatus', 'Segment', 'SelectivelyDampedLeastSquares', 'Servo', 'ServoLoop', 'ServoStep', 'SingularSets', 'Solution', 'Spectrum', 'Status', 'StreamStatus', 'Target', 'TargetStream', 'TimeOptimal', 'TimeOptimalResult', 'Trajectory', 'VelocitySolver', 'admissible_guess', 'cart_descent', 'cart_motion', 'cart_motion_by_descent', 'clearance', 'collision_cost', 'draw_from_prior', 'evaluate_cart_motion', 'evaluate_cart_motion_plane', 'evaluate_index', 'forbidden_intervals', 'geometry_aware_cost', 'index_of_jacobian', 'joint_limit_cost', 'known_singular_sets', 'least_squares', 'load_singular_sets', 'log_manipulability_cost', 'manipulability_cost', 'min_distance', 'plan_gradient', 'plan_stochastic', 'plane_cart_motion', 'planner_options', 'play', 'pose_error', 'potential_cost', 'reference_scale', 'rotation_exp', 'rotation_log', 'rules', 'scaled_cost', 'self_collision_cost', 'self_collision_pairs', 'singular_sets_of', 'solve_batch', 'spline_velocities', 'sum_of_costs', 'taut_string']
 DEFAULT_SCALE: float = 6.0
 __version__: str
 
@@ -649,6 +649,16 @@ def solve_batch(method: Method | str, J: numpy.typing.ArrayLike, twist: numpy.ty
     """
 
 # ---- Servo ------------------------------------------------------------------------------------------------------------
+class GuideState(enum.IntEnum):
+    """
+    What the guide of a Servo does for the pose target at hand (guided=True).
+    """
+    CHANGING_BRANCH = ...
+    DIRECT = ...
+    OFF = ...
+    POSTURE = ...
+    SEARCHING = ...
+    UNREACHABLE = ...
 class ServoStep:
     """
     Answer of one cycle of a Servo.
@@ -664,6 +674,16 @@ class ServoStep:
     def asked_twist(self) -> numpy.typing.NDArray[numpy.float64]:
         """
         (6,) what the rule was given: the twist command, or the pose error's [m/s, rad/s]
+        """
+    @property
+    def guide(self) -> GuideState:
+        """
+        What the guide does, see GuideState.
+        """
+    @property
+    def guide_joints(self) -> tuple[int, ...]:
+        """
+        Indices of the joints that end elsewhere by the guide's way than by the servo's own: by more than 0.5 rad, or half of the characteristic length.
         """
     @property
     def limiting_joints(self) -> tuple[int, ...]:
@@ -725,7 +745,7 @@ class Servo:
     It integrates its own command (q ← q + q̇ dt) and needs no measured positions (`measure`). Every command holds
     the chain's limits and leaves room to go on holding them; a start outside them comes back.
     """
-    def __init__(self, chain: Chain, method: Method | str | None = None, dt: typing.SupportsFloat | typing.SupportsIndex = 0.001, *, gain_linear: typing.SupportsFloat | typing.SupportsIndex = 10.0, gain_angular: typing.SupportsFloat | typing.SupportsIndex = 10.0, max_linear_error: typing.SupportsFloat | typing.SupportsIndex | None = None, max_angular_error: typing.SupportsFloat | typing.SupportsIndex = 1.0, soft_start: typing.SupportsFloat | typing.SupportsIndex = 0.1, posture: numpy.typing.ArrayLike | None = None, posture_gain: typing.SupportsFloat | typing.SupportsIndex = 0.0, posture_max_speed: typing.SupportsFloat | typing.SupportsIndex = ..., avoid: typing.Literal['manipulability', 'potential'] | None = None, avoid_gain: typing.SupportsFloat | typing.SupportsIndex = 1.0, avoid_max_speed: typing.SupportsFloat | typing.SupportsIndex = 0.5, eta1: typing.SupportsFloat | typing.SupportsIndex = 0.0, eta2: typing.SupportsFloat | typing.SupportsIndex = 10.0, position_limits: bool = True, velocity_limits: bool = True, acceleration_limits: bool = True, jerk_limits: bool = True, assumed_acceleration: typing.SupportsFloat | typing.SupportsIndex = 10.0, recovery_speed: typing.SupportsFloat | typing.SupportsIndex = 0.1, on_limit: typing.Literal['redistribute', 'scale'] = 'redistribute', exact: numpy.typing.ArrayLike | None = (0, 0, 0, 0, 0, 0), length_scale: typing.SupportsFloat | typing.SupportsIndex | None = None, mask: numpy.typing.ArrayLike | None = (1, 1, 1, 1, 1, 1), frame: typing.Literal['base', 'tool'] = 'base') -> None:
+    def __init__(self, chain: Chain, method: Method | str | None = None, dt: typing.SupportsFloat | typing.SupportsIndex = 0.001, *, gain_linear: typing.SupportsFloat | typing.SupportsIndex = 10.0, gain_angular: typing.SupportsFloat | typing.SupportsIndex = 10.0, max_linear_error: typing.SupportsFloat | typing.SupportsIndex | None = None, max_angular_error: typing.SupportsFloat | typing.SupportsIndex = 1.0, soft_start: typing.SupportsFloat | typing.SupportsIndex = 0.1, posture: numpy.typing.ArrayLike | None = None, posture_gain: typing.SupportsFloat | typing.SupportsIndex = 0.0, posture_max_speed: typing.SupportsFloat | typing.SupportsIndex = ..., avoid: typing.Literal['manipulability', 'potential'] | None = None, avoid_gain: typing.SupportsFloat | typing.SupportsIndex = 1.0, avoid_max_speed: typing.SupportsFloat | typing.SupportsIndex = 0.5, eta1: typing.SupportsFloat | typing.SupportsIndex = 0.0, eta2: typing.SupportsFloat | typing.SupportsIndex = 10.0, position_limits: bool = True, velocity_limits: bool = True, acceleration_limits: bool = True, jerk_limits: bool = True, assumed_acceleration: typing.SupportsFloat | typing.SupportsIndex = 10.0, recovery_speed: typing.SupportsFloat | typing.SupportsIndex = 0.1, on_limit: typing.Literal['redistribute', 'scale'] = 'redistribute', exact: numpy.typing.ArrayLike | None = (0, 0, 0, 0, 0, 0), length_scale: typing.SupportsFloat | typing.SupportsIndex | None = None, guided: bool = False, mask: numpy.typing.ArrayLike | None = (1, 1, 1, 1, 1, 1), frame: typing.Literal['base', 'tool'] = 'base') -> None:
         """
         Warns (ModelWarning) of velocity and acceleration limits that joints lack.
 
@@ -765,6 +785,9 @@ class Servo:
             cycle.
         length_scale: [m] > 0: 1 rad/s weighs as much as length_scale m/s, as for VelocitySolver. None:
             chain.characteristic_length.
+        guided: whether the servo takes another way to a pose target that rests where its own way does not
+            arrive: through another configuration of the arm, if need be away from the tool's straight line.
+            `step.guide` says so. Arrives at each target that PositionIk finds.
         mask: (6,) truth values: the rows (vx, vy, vz, ωx, ωy, ωz) that matter; None: all.
         frame: the axes of these rows, the base's or the tool's.
         """
@@ -1281,6 +1304,11 @@ class ConstrainedIkStep:
         The exact part's equations hold.
         """
     @property
+    def not_settling(self) -> bool:
+        """
+        The target has rested for longer than any motion takes (ConstrainedIk.settling_time), and the arm still moves.
+        """
+    @property
     def path_error(self) -> numpy.typing.NDArray[numpy.float64]:
         """
         (6,) [m, rad] the same, of the target slowed down by time_scale
@@ -1400,6 +1428,130 @@ class ConstrainedIk:
     def reference(self) -> numpy.typing.NDArray[numpy.float64]:
         """
         (4, 4) the pose that the last step aimed at: its target, slowed down by ϑ.
+        """
+    @property
+    def settling_time(self) -> float:
+        """
+        [s], after which a motion towards a target that rests is faded out.
+        """
+
+# ---- Position IK ------------------------------------------------------------------------------------------------------
+class PositionIkStatus(enum.IntEnum):
+    """
+    What a PositionIk found.
+    """
+    BAD_INPUT = ...
+    OK = ...
+    UNREACHABLE = ...
+class PositionIkResult:
+    """
+    Answer of PositionIk.solve().
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def error(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (6,) [m, rad] pose_error from q to the target, base axes; zero in the rows that the task leaves out.
+        """
+    @property
+    def q(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (n,) [rad or m] inside the limits. Where the pose is unreachable: the configuration found with the
+        smallest |e_p/L|² + |e_o|², L = chain.characteristic_length.
+        """
+    @property
+    def solve_time(self) -> float:
+        """
+        [s]
+        """
+    @property
+    def status(self) -> PositionIkStatus:
+        """
+        See PositionIkStatus.
+        """
+class PositionIkBranch:
+    """
+    One of the solutions of PositionIk.branches().
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def margin(self) -> float:
+        """
+        [rad or m] from the nearest limit; inf where no joint has a limit.
+        """
+    @property
+    def q(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (n,) [rad or m] inside the limits.
+        """
+    @property
+    def sigma_min(self) -> float:
+        """
+        Least singular value of the task's rows, lengths in characteristic lengths.
+        """
+class PositionIk:
+    """
+    Joint positions of a pose, for any chain of 1 to 16 joints, inside its position limits.
+
+        ik = sk.PositionIk(chain)
+        r = ik.solve(pose)                           # or ik.solve(pose, near=q)
+        r.q, r.status, r.error
+
+    A Levenberg-Marquardt descent with an active set of limits, from the entries of a table of configurations whose
+    poses are closest to the target; the closed form where the arm has one (AnalyticIk). The same call gives the
+    same answer. Immutable, safe to share.
+    """
+    def __init__(self, chain: Chain, tolerance: numpy.typing.ArrayLike = (1e-06, 1e-06), *, mask: numpy.typing.ArrayLike | None = (1, 1, 1, 1, 1, 1), frame: typing.Literal['base', 'tool'] = 'base', starts: typing.SupportsInt | typing.SupportsIndex = 256) -> None:
+        """
+        tolerance: (2,) [m], [rad] > 0: the largest errors of position and orientation that a solution may
+            have; most solutions are exact to rounding.
+        mask: (6,) truth values: the rows (vx, vy, vz, ωx, ωy, ωz) that matter; None: all.
+        frame: the axes of these rows, the base's or the tool's.
+        starts: 1 to 2048, the most starts of a search. A pose out of reach takes all of them.
+        """
+    def __repr__(self) -> str:
+        ...
+    def branches(self, pose: typing.Any) -> list[PositionIkBranch]:
+        """
+        The solutions of solve_all() in the same order, each with its least singular value and its margin.
+        """
+    def solve(self, pose: typing.Any, near: numpy.typing.ArrayLike | None = None) -> PositionIkResult:
+        """
+        A solution of `pose` (4, 4), tip in base; PositionIkResult.
+
+        near: (n,) [rad or m]. The answer is then the nearest solution that a bounded search finds, in travel time
+        max_i |q_i − near_i| / velocity limit_i (1 where there is no limit). Joints that may turn more than once are
+        on the turn nearest to `near`, and a redundant arm is moved along its self-motion towards `near`.
+        Without `near` it is the first solution that is found, each joint on the turn nearest to 0.
+
+        Raises Error where `pose` is not a pose. A pose out of reach is UNREACHABLE, with the nearest pose found.
+        """
+    def solve_all(self, pose: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Distinct solutions (k, n) [rad or m] of `pose` (4, 4), those far from the limits first; k = 0 where none is
+        found.
+
+        Solutions that differ by whole turns count once: each joint is on the turn nearest to the middle of its
+        range. For a redundant arm the solutions are moved along their self-motion to a local minimum of the
+        distance to the middle of the ranges, and these minima are the representatives.
+        """
+    def solve_batch(self, poses: numpy.typing.ArrayLike, threads: typing.SupportsInt | typing.SupportsIndex = 1) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        solve() of B poses (B, 4, 4), without the GIL: (B, n), a row of NaN where no solution is found.
+
+        The answers do not depend on `threads`. Raises Error where an entry is not a pose.
+        """
+    @property
+    def chain(self) -> Chain:
+        """
+        The arm.
+        """
+    @property
+    def options(self) -> dict[str, typing.Any]:
+        """
+        The options by keyword: with ** of them the constructor makes the same again.
         """
 
 # ---- Indices ----------------------------------------------------------------------------------------------------------

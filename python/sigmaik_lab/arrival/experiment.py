@@ -19,6 +19,7 @@ from sigmaik._types import Array
 
 __all__ = [
     "ARRIVED",
+    "ON_TIME",
     "SERVOS",
     "TARGETS",
     "TIMES",
@@ -28,6 +29,7 @@ __all__ = [
     "draw_trials",
     "drive",
     "held_limits",
+    "joint_time",
     "make_servo",
 ]
 
@@ -36,19 +38,26 @@ TARGETS: dict[str, str] = {
     "near": "the pose of a configuration that differs from the start by up to 0.25 rad or m in each joint",
     "random": "the pose of any configuration",
     "beyond": "the same pose, 1.2 to 2 times as far from the base as the arm reaches",
+    "home": "the pose of the start, after four seconds towards such a pose beyond reach",
+    "zeros": "from all joints at zero, a step of 0.2 characteristic lengths along an axis or of 0.2 rad about it, in "
+    "turn, where PositionIk finds a configuration",
 }
 #: Servos that the study compares.
 SERVOS: dict[str, str] = {
     "default": "sk.Servo(arm)",
+    "guided": "sk.Servo(arm, guided=True)",
     "fixed": "J-PARSE with γ = 0.02, not adaptive",
 }
 #: [m, rad] A tip this near has arrived: 1 mm, 0.5°.
 ARRIVED = (1e-3, math.radians(0.5))
 #: [s] of a trial, where --time does not say.
-TIMES = {"near": 4.0, "random": 10.0, "beyond": 30.0}
+TIMES = {"near": 4.0, "random": 10.0, "beyond": 30.0, "home": 10.0, "zeros": 8.0}
+STEP = 0.2  #: [rad, or characteristic lengths] of `zeros`
 NEAR = 0.25  #: [rad or m] in each joint
 RANGE = 0.98  #: part of a joint's range in which starts and targets are drawn
 TURN = math.pi  #: [rad or m] to both sides: the range of a joint without position limits
+AWAY = 4.0  #: [s] for which a trial of `home` goes out of reach
+ON_TIME = (5.0, 1.5)  #: an arrival is on time within 5 s, or 1.5 times the least time of the joints
 RESTING = 1e-3  #: part of the velocity limit (or rad/s, m/s): a slower joint rests
 
 
@@ -98,6 +107,7 @@ class Trial:
 
     start: Array  #: (n,)
     target: Array  #: (4, 4)
+    before: Array | None = None  #: (4, 4) where the arm goes first, for `AWAY`; the time starts after this
 
 
 @dataclass(frozen=True)
@@ -109,6 +119,8 @@ class Arrivals:
     angle: Array  #: (N,) [rad]
     rest: NDArray[np.bool_]  #: (N,) whether all joints rest at the end
     speed: Array  #: (N,) [rad/s or m/s] of the fastest joint at the end
+    least: Array  #: (N,) [s] in which the joints can get to the nearest configuration that PositionIk finds; inf: none
+    led: NDArray[np.bool_]  #: (N,) whether the guide led the joints away from the tool's own way
     excess: Array  #: (N,) the largest excess over a limit: part of the limit, and of positions rad or m; 0: none
 
 
@@ -124,28 +136,48 @@ def draw_trials(chain: sk.Chain, settings: ArrivalSettings) -> list[Trial]:
         q: Array = middle + half * rng.uniform(-1.0, 1.0, chain.dof)
         return q
 
+    if settings.targets == "zeros":
+        return _steps_from_zeros(chain, settings.trials)
     reach = 0.0
-    if settings.targets == "beyond":
+    if settings.targets in ("beyond", "home"):
         reach = max(float(np.linalg.norm(chain.pose(anywhere())[:3, 3])) for _ in range(2000))
     trials = []
     for _ in range(settings.trials):
         start = anywhere()
         if settings.targets == "near":
-            goal = np.clip(start + rng.uniform(-NEAR, NEAR, chain.dof), limits.lower, limits.upper)
+            goal: Array = np.clip(start + rng.uniform(-NEAR, NEAR, chain.dof), limits.lower, limits.upper)
         else:
             goal = anywhere()
         target = chain.pose(goal)
-        if settings.targets == "beyond":
+        if reach > 0.0:
             away = target[:3, 3] / max(1e-9, float(np.linalg.norm(target[:3, 3])))
             target[:3, 3] = rng.uniform(1.2, 2.0) * reach * away
-        trials.append(Trial(start, target))
+        home = settings.targets == "home"
+        trials.append(Trial(start, chain.pose(start), target) if home else Trial(start, target))
     return trials
+
+
+def _steps_from_zeros(chain: sk.Chain, most: int) -> list[Trial]:
+    start = np.clip(np.zeros(chain.dof), chain.limits.lower, chain.limits.upper)
+    ik = sk.PositionIk(chain)
+    trials = []
+    for axis in range(6):
+        for sign in (1.0, -1.0):
+            target = chain.pose(start)
+            step = sign * STEP * np.eye(3)[axis % 3]
+            if axis < 3:
+                target[:3, 3] += chain.characteristic_length * step
+            else:
+                target[:3, :3] = sk.rotation_exp(step) @ target[:3, :3]
+            if ik.solve(target, near=start).status == sk.PositionIkStatus.OK:
+                trials.append(Trial(start, target))
+    return trials[:most]
 
 
 def make_servo(name: str, chain: sk.Chain, rate: float) -> sk.Servo:
     """A servo of `SERVOS`."""
-    if name == "default":
-        return sk.Servo(chain, dt=1.0 / rate)
+    if name != "fixed":
+        return sk.Servo(chain, dt=1.0 / rate, guided=name == "guided")
     rule = sk.JParse(gamma=0.02, adaptive=False)
     return sk.Servo(chain, rule, dt=1.0 / rate, gain_linear=10.0, gain_angular=10.0)
 
@@ -167,25 +199,44 @@ def drive(
 ) -> Arrivals:
     """Drives a servo of `SERVOS` to all targets. progress: called after each trial."""
     servo = make_servo(name, chain, settings.rate)
+    ik = sk.PositionIk(chain)
     cycles = settings.cycles
     columns = []
     for trial in trials:
         q, qdot, error = np.empty((cycles + 1, chain.dof)), np.empty((cycles, chain.dof)), np.empty((cycles + 1, 6))
         servo.reset(trial.start)
-        q[0] = trial.start
+        start_qdot = np.zeros(chain.dof)
+        if trial.before is not None:
+            for _ in range(round(AWAY * settings.rate)):
+                start_qdot = servo.update(trial.before).qdot
+        q[0] = servo.q
+        led = False
         for k in range(cycles):
             step = servo.update(trial.target)
             q[k + 1], qdot[k], error[k] = step.q, step.qdot, step.pose_error
+            led = led or step.guide == sk.GuideState.CHANGING_BRANCH
         error[cycles] = sk.pose_error(chain.pose(q[cycles]), trial.target)
-        columns.append(_judge(servo, q, qdot, error, settings.rate))
+        found = ik.solve(trial.target, near=q[0])
+        least = joint_time(servo, q[0], found.q) if found.status == sk.PositionIkStatus.OK else math.inf
+        columns.append((*_judge(servo, q, qdot, error, settings.rate, start_qdot), least, led))
         if progress is not None:
             progress()
-    time, position, angle, rest, speed, excess = (np.array(column) for column in zip(*columns, strict=True))
-    return Arrivals(time, position, angle, rest, speed, excess)
+    time, position, angle, rest, speed, excess, least, led = (np.array(column) for column in zip(*columns, strict=True))
+    return Arrivals(time, position, angle, rest, speed, least, led, excess)
+
+
+def joint_time(servo: sk.Servo, start: Array, goal: Array) -> float:
+    """[s] of the fastest motion of all joints from rest at `start` to rest at `goal`, without jerk limits."""
+    velocity, acceleration, _ = held_limits(servo)
+    way = np.abs(goal - start)
+    ramps = 2.0 * np.sqrt(way / acceleration)  # never at full speed
+    with np.errstate(invalid="ignore"):
+        cruise = way / velocity + velocity / acceleration
+    return float(np.where(way * acceleration > velocity**2, cruise, ramps).max())
 
 
 def _judge(
-    servo: sk.Servo, q: Array, qdot: Array, error: Array, rate: float
+    servo: sk.Servo, q: Array, qdot: Array, error: Array, rate: float, start_qdot: Array | None = None
 ) -> tuple[float, float, float, bool, float, float]:
     position, angle = np.linalg.norm(error[:, :3], axis=1), np.linalg.norm(error[:, 3:], axis=1)
     away = np.flatnonzero((position > ARRIVED[0]) | (angle > ARRIVED[1]))
@@ -194,18 +245,28 @@ def _judge(
     velocity, acceleration, jerk = held_limits(servo)
     last = np.abs(qdot[-1])
     rest = bool(np.all(last <= RESTING * np.where(np.isfinite(velocity), velocity, 1.0)))
-    return time, float(position[-1]), float(angle[-1]), rest, float(last.max()), _excess(servo, q, qdot, rate)
+    return (
+        time,
+        float(position[-1]),
+        float(angle[-1]),
+        rest,
+        float(last.max()),
+        _excess(servo, q, qdot, rate, start_qdot),
+    )
 
 
-def _excess(servo: sk.Servo, q: Array, qdot: Array, rate: float) -> float:
+def _excess(servo: sk.Servo, q: Array, qdot: Array, rate: float, start_qdot: Array | None = None) -> float:
     """The largest excess over a limit, by differences of the commands, as a robot's controller checks them.
 
-    What the rounding of the differences can make is not counted.
+    What the rounding of the differences can make is not counted. start_qdot: (n,) before the first command; None: zero.
+    After a motion, the jerk of the first cycle is not known.
     """
     limits = servo.chain.limits
     velocity, acceleration, jerk = held_limits(servo)
-    change = np.diff(qdot, axis=0, prepend=0.0) * rate
-    change_of_change = np.diff(change, axis=0, prepend=0.0) * rate
+    moving = start_qdot is not None and bool(np.any(start_qdot != 0.0))
+    before = np.zeros(servo.chain.dof) if start_qdot is None else start_qdot
+    change = np.diff(qdot, axis=0, prepend=before[None]) * rate
+    change_of_change = np.diff(change, axis=0, prepend=change[:1] if moving else 0.0) * rate
     rounding = 4.0 * np.finfo(float).eps * max(1.0, float(np.abs(qdot).max()))
     worst = max(0.0, float((q - limits.upper).max()), float((limits.lower - q).max()))
     for value, limit, slack in (

@@ -14,7 +14,7 @@ from .experiment import Arrivals
 
 __all__ = ["arrival_figure"]
 
-_STYLES = {"default": ("#0072B2", "-"), "fixed": ("#7A5C3E", (0, (5, 1.5)))}
+_STYLES = {"default": ("#0072B2", "-"), "guided": ("#D55E00", "-"), "fixed": ("#7A5C3E", (0, (5, 1.5)))}
 
 
 def arrival_figure(title: str, seconds: float, done: Mapping[str, Mapping[str, Arrivals]]) -> Figure:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .experiment import Arrivals
+from .experiment import ON_TIME, Arrivals
 
 __all__ = ["ArrivalSummary", "summarize_arrivals"]
 
@@ -20,6 +20,9 @@ class ArrivalSummary:
     servo: str
     trials: int
     arrived: float  #: share of trials in which the tip arrived and stayed
+    on_time: float  #: share of trials in which the tip arrived within `ON_TIME`
+    led: float  #: share of trials in which the guide led the joints away from the tool's own way
+    least_time: float  #: [s] the median of the least times of the joints; inf: most targets are out of reach
     median_time: float  #: [s] in which half of all trials had arrived; inf: fewer arrived
     time_90: float  #: [s] the same for 90 % of all trials
     at_rest: float  #: share of trials at whose end all joints rest
@@ -36,6 +39,11 @@ def summarize_arrivals(robot: str, targets: str, servo: str, done: Arrivals) -> 
         servo=servo,
         trials=n,
         arrived=float(np.isfinite(times).mean()),
+        on_time=float(
+            (done.time <= np.maximum(ON_TIME[0], ON_TIME[1] * np.where(done.least < np.inf, done.least, 0.0))).mean()
+        ),
+        led=float(done.led.mean()),
+        least_time=float(np.sort(done.least)[(n - 1) // 2]),
         median_time=float(times[(n - 1) // 2]),
         time_90=float(times[min(n - 1, int(np.ceil(0.9 * n)) - 1)]),
         at_rest=float(done.rest.mean()),
