@@ -14,7 +14,8 @@ __all__ = ["arrival_table"]
 
 def arrival_table(rows: Sequence[ArrivalSummary]) -> Table:
     """A row for each arm and servo: the share of trials that arrived, and of those that arrived late (`ON_TIME`); the
-    share that the guide led away from the tool's own way; the times in which a half and 90 % of all trials had arrived; the share at rest; and the largest excess over a limit.
+    share that the guide led away from the tool's own way; the times in which a half and 90 % of all trials had
+    arrived; the share at rest; and the largest excess over a limit.
 
     Red: joints that move at the end, and broken limits.
     """
