@@ -1,5 +1,5 @@
-// Position IK on every shipped arm: random configurations inside the limits give the poses. What counts is the mean time,
-// and the share of poses that are solved within 5 ms (`solved`, 1 is all).
+// Position IK on every shipped arm: random configurations inside the limits give the poses. What counts is the mean
+// time, and the share of poses that are solved within 5 ms (`solved`, 1 is all).
 #include <cmath>
 #include <filesystem>
 #include <map>
@@ -75,8 +75,10 @@ const bool registered = [] {
   }
   for (const auto& [name, arm] : arms) {
     const Arm* const one = &arm;
-    benchmark::RegisterBenchmark(("position_ik_solve/" + name).c_str(), [one](auto& state) { solve(state, *one, false); });
-    benchmark::RegisterBenchmark(("position_ik_near/" + name).c_str(), [one](auto& state) { solve(state, *one, true); });
+    benchmark::RegisterBenchmark(("position_ik_solve/" + name).c_str(),
+                                 [one](auto& state) { solve(state, *one, false); });
+    benchmark::RegisterBenchmark(("position_ik_near/" + name).c_str(),
+                                 [one](auto& state) { solve(state, *one, true); });
     benchmark::RegisterBenchmark(("position_ik_all/" + name).c_str(), [one](auto& state) { solve_all(state, *one); });
   }
   return true;

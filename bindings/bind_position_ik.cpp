@@ -78,9 +78,9 @@ std::vector<PositionIkBranch> branches(const PositionIk& ik, const py::object& p
 
 PositionIkResult solve(const PositionIk& ik, const py::object& pose, const MaybeArray& near) {
   const Pose target = pose_argument(pose, "pose");
-  if (!near) return ik.solve(target);
-  const PositionIkResult found = ik.solve(target, joint_argument(*near, "near", ik.chain().dof()));
-  if (found.status == PositionIkStatus::BadInput) throw Error("near is too large: beyond 1e9 rad or m");
+  const PositionIkResult found = near ? ik.solve(target, joint_argument(*near, "near", ik.chain().dof()))
+                                      : ik.solve(target);
+  if (found.status == PositionIkStatus::BadInput) throw Error("pose or near is too large: beyond 1e9 rad or m");
   return found;
 }
 

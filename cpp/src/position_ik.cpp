@@ -62,6 +62,10 @@ PositionIkOptions checked(const PositionIkOptions& options) {
   return options;
 }
 
+bool acceptable(const Pose& pose) noexcept {
+  return is_pose(pose.matrix()) && pose.translation().cwiseAbs().maxCoeff() <= kLargest;
+}
+
 JointVector middle_of(const JointLimits& limits) {
   JointVector middle = 0.5 * (limits.lower + limits.upper);
   for (int i = 0; i < middle.size(); ++i) {
@@ -238,7 +242,7 @@ const PositionIkOptions& PositionIk::options() const noexcept { return model_->o
 PositionIkResult PositionIk::solve(const Pose& pose) const noexcept {
   const Clock::time_point start = Clock::now();
   const Model& m = *model_;
-  if (!is_pose(pose.matrix())) return {};
+  if (!acceptable(pose)) return {};
   const Descent search(m.problem, pose);
   Branches found(m.problem, kApart);
   m.closed_form_branches(pose, nullptr, found);
@@ -255,7 +259,7 @@ PositionIkResult PositionIk::solve(const Pose& pose) const noexcept {
 PositionIkResult PositionIk::solve(const Pose& pose, const JointRef& near) const noexcept {
   const Clock::time_point start = Clock::now();
   const Model& m = *model_;
-  if (!is_pose(pose.matrix()) || near.size() != m.chain.dof() || !near.allFinite()) return {};
+  if (!acceptable(pose) || near.size() != m.chain.dof() || !near.allFinite()) return {};
   if (near.cwiseAbs().maxCoeff() > kLargest) return {};
   const JointVector from = near;
   const Descent search(m.problem, pose), local(m.on_turn, pose);
@@ -276,7 +280,8 @@ PositionIkResult PositionIk::solve(const Pose& pose, const JointRef& near) const
 
 std::vector<PositionIkBranch> PositionIk::solve_all(const Pose& pose) const {
   const Model& m = *model_;
-  require(is_pose(pose.matrix()), "solve_all: the pose has an entry that is not finite, or its rotation is none");
+  require(acceptable(pose), "solve_all: the pose is not finite, is farther away than ", kLargest,
+          " m, or has a rotation that is none");
   const Descent search(m.problem, pose), local(m.on_turn, pose);
   Branches found(m.problem, kApart), distinct(m.problem, m.redundant() ? kApartRedundant : kApart);
   m.closed_form_branches(pose, nullptr, found);

@@ -32,21 +32,26 @@ JointMatrix curvature(const DescentPoint& point, const Descent::Columns& columns
   return h;
 }
 
+using Factor = Eigen::LLT<JointMatrix>;
+constexpr int kTries = 64;  // of λ, each four times the one before
+
 // The rows and columns of h that are free, with λ on the diagonal, factorised. λ grows until the matrix is positive.
-Eigen::LLT<JointMatrix> factor(const JointMatrix& h, const std::array<int, kMaxJoints>& free, int count,
-                               double& lambda) noexcept {
+bool factorise(const JointMatrix& h, const std::array<int, kMaxJoints>& free, int count, double& lambda,
+               Factor& out) noexcept {
   JointMatrix part(count, count);
-  Eigen::LLT<JointMatrix> out(count);
-  for (;;) {
-    for (int i = 0; i < count; ++i) {
-      for (int j = 0; j < count; ++j) {
-        part(i, j) = h(free[static_cast<std::size_t>(i)], free[static_cast<std::size_t>(j)]) + (i == j ? lambda : 0.0);
-      }
+  for (int i = 0; i < count; ++i) {
+    for (int j = 0; j < count; ++j) {
+      part(i, j) = h(free[static_cast<std::size_t>(i)], free[static_cast<std::size_t>(j)]);
     }
-    out.compute(part);
-    if (out.info() == Eigen::Success) return out;
+  }
+  for (int i = 0; i < kTries; ++i) {
+    JointMatrix damped = part;
+    damped.diagonal().array() += lambda;
+    out.compute(damped);
+    if (out.info() == Eigen::Success) return true;
     lambda *= 4.0;
   }
+  return false;
 }
 
 }  // namespace
@@ -82,7 +87,9 @@ JointVector Descent::curved_step(const DescentPoint& point, double damping, doub
         if ((fixed >> k & 1u) != 0) right[i] -= h(joint, k) * move[k];
       }
     }
-    const JointVector z = factor(h, free, count, lambda).solve(right);
+    Factor factor(count);
+    if (!factorise(h, free, count, lambda, factor)) break;
+    const JointVector z = factor.solve(right);
     bool inside = true;
     for (int i = 0; i < count; ++i) {
       const int joint = free[static_cast<std::size_t>(i)];

@@ -519,6 +519,12 @@ TEST_CASE("bad input has the status BadInput, and no answer") {
   Pose scaled = good;
   scaled.linear() *= 1.1;
   CHECK(refused(ik.solve(scaled)));
+  Pose far = good;
+  far.translation().x() = 1e300;
+  CHECK(refused(ik.solve(far)));
+  CHECK_THROWS_AS(ik.solve_all(far), sigmaik::Error);
+  far.translation().x() = 9e8;
+  CHECK(ik.solve(far).status == PositionIkStatus::Unreachable);
   CHECK(refused(ik.solve(good, JointVector::Zero(5))));
   CHECK(refused(ik.solve(good, JointVector::Constant(6, 1e10))));
 }

@@ -50,7 +50,7 @@ struct PositionIkOptions {
 enum class PositionIkStatus : std::int8_t {
   Ok = 0,           ///< a solution, inside tolerance and limits
   Unreachable = 1,  ///< none was found; q is the configuration with the smallest E that was found
-  BadInput = 2,     ///< NaN, infinite, not a rotation, or a wrong size
+  BadInput = 2,     ///< NaN, beyond 1e9 rad or m, not a rotation, or a wrong size
 };
 
 /// "ok", "unreachable", "bad input".
