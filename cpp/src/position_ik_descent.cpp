@@ -217,7 +217,7 @@ void Descent::polish(DescentPoint& point) const noexcept {
 // In a curved valley, such as beside a singularity, a whole step leaves the valley's ground, and the next one comes
 // back far ahead. A descent that must be lower after every step creeps along the ground instead. Hence a step may be
 // worse than the last point, but not than all of the last three (Grippo, Lampariello and Lucidi, "A nonmonotone line
-// search technique for Newton's method", SIAM J. Numer. Anal. 23(4), 1986).
+// search technique for Newton's method", SIAM Journal on Numerical Analysis 23(4), 1986).
 bool Descent::run(DescentPoint& point, const Effort& effort) const noexcept {
   evaluate(point);
   DescentPoint next;
