@@ -29,6 +29,7 @@ def shown() -> list[object]:
     torque = sk.ComputedTorque(arm)
     loop = sk.ServoLoop(servo)
     puma = sk.AnalyticIk(sk.robots.load("puma560"))
+    position = sk.PositionIk(arm)
     plan = sk.planning.time_optimal(arm, q, q + 0.1)
     return [
         arm,
@@ -52,6 +53,9 @@ def shown() -> list[object]:
         loop.statistics,
         puma,
         puma.branches(sk.robots.load("puma560").pose(sk.robots.home("puma560")))[0],
+        position,
+        position.solve(servo.pose, q),
+        position.branches(servo.pose)[0],
         sk.least_squares(np.eye(2), np.ones(2)),
         sk.singularities.of(sk.robots.load("franka_panda")),
         plan,

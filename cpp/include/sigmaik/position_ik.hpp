@@ -15,8 +15,8 @@
 /// As the damping goes to zero with the error, the convergence is quadratic at a regular solution, and the descent
 /// converges at a singular solution, too. A joint that a step would take beyond a limit stays at the limit exactly, and
 /// the other joints take over (an active set; Bertsekas, "Projected Newton methods for optimization problems with
-/// simple constraints", SIAM Journal on Control and Optimization 20(2), 1982). Orientations are compared by the logarithm of the rotation
-/// between them, which is accurate up to a half turn.
+/// simple constraints", SIAM Journal on Control and Optimization 20(2), 1982). Orientations are compared by the
+/// logarithm of the rotation between them, which is accurate up to a half turn.
 ///
 /// A descent ends in a local minimum for a part of the starts, mostly at a limit. Hence the constructor makes a table
 /// of configurations that are spread evenly over the joint ranges (an additive recurrence), with their poses. A search
