@@ -36,8 +36,10 @@ GuideOwner::~GuideOwner() = default;
 
 namespace {
 
-constexpr double kStep = 4e-3;      // [s] of a predicted cycle: the servo's thresholds are still those of its own cycle
-constexpr double kAhead = 32.0;     // [s] of predicted motion in a second, so that a prediction takes a tenth of a second
+constexpr double kStep = 4e-3;   // [s] of a predicted cycle: the servo's thresholds are still those of its own cycle
+constexpr double kAhead = 32.0;  // [s] of predicted motion in a second, so that a prediction takes a tenth of a second
+constexpr double kTakesLong = 1.5;    // [s] of predicted motion, from which on the search goes on at the same time
+constexpr double kSlices = 4000.0;  // [1/s] of the search
 constexpr double kQuiet = 0.02;     // [s] for which a target has to rest: a hand that drags it gets no prediction
 constexpr double kSame = 1e-3;      // [rad, or L] a target that moves by less is the same
 constexpr double kArrived = 1e-3;   // [L] of the position
@@ -81,6 +83,7 @@ void Guide::begin(const Pose& target) noexcept {
   phase_ = Phase::Waiting;
   state_ = GuideState::Direct;
   searched_ = with_posture_ = false;
+  search_.reset();
   joints_ = 0;
   time_ = away_ = 0.0;
 }
@@ -104,14 +107,15 @@ void Guide::advise(const Pose& target, const Twist& error, const Servo& servo) n
       if (time_ >= kQuiet) start_prediction(servo, false);
       break;
     case Phase::Predicting: predict(servo); break;
-    case Phase::Searching: search(servo); break;
+    case Phase::Searching:
+      if (search(servo)) after_search(servo);
+      break;
     case Phase::Following:
       if (arrived(error, servo)) {
         phase_ = Phase::Done;
       } else if (time_ > kLate * predicted_ + kLateness || stuck(error, servo.options().dt)) {
         end_ = servo.q();
-        phase_ = Phase::Searching;
-        if (searched_) choose_lead(servo);
+        with_posture_ ? choose_lead(servo) : seek();
       }
       break;
     case Phase::Leading:
@@ -135,7 +139,7 @@ void Guide::start_prediction(const Servo& servo, bool with_posture) noexcept {
   predictor_.reset(servo.q(), servo.qdot());
   predicted_ = 0.0;
   start_way();
-  horizon_ = std::max(kPatience, searched_ ? kLonger * travel_time(servo.q()) : 0.0);
+  horizon_ = std::max(kPatience, with_posture ? kLonger * travel_time(servo.q()) : 0.0);
 }
 
 // Whether the error has not fallen for a while.
@@ -177,21 +181,34 @@ void Guide::predict(const Servo& servo) noexcept {
     if (outcome == Outcome::Open && predicted_ < horizon_) continue;
     if (with_posture_) return choose_lead(servo);
     end_ = predictor_.q();
-    phase_ = Phase::Searching;
-    state_ = GuideState::Searching;
-    return;
+    return seek();
   }
+  // A motion that takes long may be in vain.
+  if (predicted_ > kTakesLong) search(servo);
 }
 
-void Guide::search(const Servo& servo) noexcept {
-  const PositionIkResult found = ik_.solve(target_, servo.q());
-  if (found.status != PositionIkStatus::Ok) {
+void Guide::seek() noexcept {
+  phase_ = Phase::Searching;
+  state_ = GuideState::Searching;
+}
+
+// Some slices of the search. Returns whether the search has ended.
+bool Guide::search(const Servo& servo) noexcept {
+  if (searched_) return true;
+  if (!search_) search_.emplace(ik_, target_, servo.q());
+  const int slices = std::max(1, static_cast<int>(kSlices * servo.options().dt));
+  for (int i = 0; i < slices && !searched_; ++i) searched_ = search_->advance();
+  return searched_;
+}
+
+// The servo's own way does not arrive, and the search has ended.
+void Guide::after_search(const Servo& servo) noexcept {
+  if (!search_->found()) {
     phase_ = Phase::Done;
     state_ = GuideState::Unreachable;
     return;
   }
-  goal_ = found.q;
-  searched_ = true;
+  goal_ = search_->best().q;
   if (ik_.chain().dof() > servo.options().task.rows()) return start_prediction(servo, true);
   choose_lead(servo);
 }

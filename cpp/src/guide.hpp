@@ -3,8 +3,12 @@
 
 #include <cstdint>
 
+#include <optional>
+
 #include <sigmaik/position_ik.hpp>
 #include <sigmaik/servo.hpp>
+
+#include "position_ik_search.hpp"
 
 namespace sigmaik::detail {
 
@@ -44,9 +48,10 @@ class Guide {
   void begin(const Pose& target) noexcept;
   void start_prediction(const Servo& servo, bool with_posture) noexcept;
   void predict(const Servo& servo) noexcept;
-  void search(const Servo& servo) noexcept;
+  bool search(const Servo& servo) noexcept;
+  void after_search(const Servo& servo) noexcept;
   void choose_lead(const Servo& servo) noexcept;
-  void follow() noexcept;
+  void seek() noexcept;
   Outcome run_prediction() noexcept;
   void start_way() noexcept;
   bool stuck(const Twist& error, double dt) noexcept;
@@ -55,21 +60,22 @@ class Guide {
 
   Servo predictor_;
   PositionIk ik_;
+  std::optional<NearestSearch> search_;
   Phase phase_ = Phase::Nothing;
   GuideState state_ = GuideState::Off;
   Pose target_ = Pose::Identity();
-  JointVector goal_;               // joint positions of the target
-  JointVector end_;                // of the servo's own way
-  bool searched_ = false;          // goal_ is known
-  bool with_posture_ = false;      // the prediction, and then the servo, has goal_ as its posture
+  JointVector goal_;           // joint positions of the target
+  JointVector end_;            // of the servo's own way
+  bool searched_ = false;      // the search has ended
+  bool with_posture_ = false;  // the prediction, and then the servo, has goal_ as its posture
   std::uint16_t joints_ = 0;
-  double time_ = 0.0;              // [s] in this phase
-  double predicted_ = 0.0;         // [s] that the prediction has reached
-  double horizon_ = 0.0;           // [s] of the prediction
-  double still_ = 0.0;             // [s] for which the predicted arm has rested
-  double least_ = 0.0;             // error of the motion that is watched, when it had fallen last
-  double since_least_ = 0.0;       // [s] since then
-  double away_ = 0.0;              // [s] for which the arm has been away from a target where it had arrived
+  double time_ = 0.0;         // [s] in this phase
+  double predicted_ = 0.0;    // [s] that the prediction has reached
+  double horizon_ = 0.0;      // [s] of the prediction
+  double still_ = 0.0;        // [s] for which the predicted arm has rested
+  double least_ = 0.0;        // error of the motion that is watched, when it had fallen last
+  double since_least_ = 0.0;  // [s] since then
+  double away_ = 0.0;         // [s] for which the arm has been away from a target where it had arrived
 };
 
 }  // namespace sigmaik::detail

@@ -6,8 +6,8 @@
 
 #include <sigmaik/pose.hpp>
 
-#include "guide.hpp"
 #include "finite.hpp"
+#include "guide.hpp"
 #include "length.hpp"
 #include "message.hpp"
 #include "numbers.hpp"

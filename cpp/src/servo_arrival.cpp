@@ -95,8 +95,8 @@ void Servo::slow_down(ServoStep& step) noexcept {
 // exact rows as they are. Singular directions of this part may be missed, by z: the row is (σ_i/w_i) v_iᵀ, and z_i has
 // the weight 1 − σ_i/w_i. Returns false where the numbers are too far apart.
 bool Servo::slow_down_by_rows(ServoStep& step) noexcept {
-  constexpr double kSlower = 1e-3;       // k: slower motion costs 1/k² times as much as another motion of the joints
-  constexpr double kSlowerRest = 3e-2;   // of the rows that are not exact: a thousand times less
+  constexpr double kSlower = 1e-3;      // k: slower motion costs 1/k² times as much as another motion of the joints
+  constexpr double kSlowerRest = 3e-2;  // of the rows that are not exact: a thousand times less
   const int n = chain_.dof();
   const Spectrum& spectrum = has_exact() ? exact_spectrum_ : solver_.spectrum();
   const int first = static_cast<int>(spectrum.size());

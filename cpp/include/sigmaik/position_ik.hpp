@@ -39,6 +39,11 @@
 
 namespace sigmaik {
 
+namespace detail {
+class FirstSearch;
+class NearestSearch;
+}  // namespace detail
+
 /// Settings of a PositionIk.
 struct PositionIkOptions {
   std::array<double, 2> tolerance{1e-6, 1e-6};  ///< [m], [rad] > 0: largest errors of position and orientation
@@ -113,6 +118,8 @@ class PositionIk {
   const PositionIkOptions& options() const noexcept;
 
  private:
+  friend class detail::FirstSearch;
+  friend class detail::NearestSearch;
   struct Model;
   std::shared_ptr<const Model> model_;
 };

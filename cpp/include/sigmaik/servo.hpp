@@ -68,12 +68,13 @@ struct ServoOptions {
 
 /// What the guide of a servo does (ServoOptions::guided), for the pose target at hand.
 enum class GuideState : std::int8_t {
-  Off = 0,             ///< there is no guide, or no pose target
-  Direct = 1,          ///< the servo goes its own way
-  Searching = 2,       ///< the servo's own way does not arrive; the guide looks for another, meanwhile the servo goes on
-  Posture = 3,         ///< the tool goes its own way, and the arm's self-motion leads to another configuration
-  ChangingBranch = 4,  ///< the joints go straight to positions at which the tool is at the target: the tool leaves its way
-  Unreachable = 5,     ///< no joint positions were found; the servo goes as near as its own way leads
+  Off = 0,        ///< there is no guide, or no pose target
+  Direct = 1,     ///< the servo goes its own way
+  Searching = 2,  ///< the servo's own way does not arrive; the guide looks for another, meanwhile the servo goes on
+  Posture = 3,    ///< the tool goes its own way, and the arm's self-motion leads to another configuration
+  ChangingBranch =
+      4,            ///< the joints go straight to positions at which the tool is at the target: the tool leaves its way
+  Unreachable = 5,  ///< no joint positions were found; the servo goes as near as its own way leads
 };
 
 /// "off", "direct", "searching", "posture", "changing branch", "unreachable".

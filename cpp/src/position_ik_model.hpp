@@ -1,0 +1,49 @@
+#pragma once
+// What the searches of a PositionIk have in common.
+
+#include <chrono>
+#include <optional>
+
+#include <sigmaik/analytic_ik.hpp>
+#include <sigmaik/position_ik.hpp>
+
+#include "position_ik_branches.hpp"
+#include "position_ik_descent.hpp"
+#include "position_ik_starts.hpp"
+
+namespace sigmaik {
+namespace detail {
+
+inline constexpr Effort kQuick{24, 0.5, false, false};  // of a start
+inline constexpr Effort kLong{80, 0.95, false, true};   // of the best start of a block
+inline constexpr int kBlock = 16;                       // starts
+inline constexpr double kApart = 1e-2;                  // solutions differ by more than this in a joint [rad, or L]
+inline constexpr double kLargest = 1e9;                 // of a position [rad or m]: above, rounding exceeds 1e-7
+
+}  // namespace detail
+
+struct PositionIk::Model {
+  Model(const Chain& arm, const PositionIkOptions& given);
+
+  Chain chain;
+  PositionIkOptions options;
+  detail::DescentProblem problem;  // of a search for any solution
+  detail::DescentProblem on_turn;  // of a search near a configuration: every joint stays on its turn
+  JointVector middle, zero;        // of the joint ranges; 0, or the limit nearest to 0
+  JointVector speed, half;         // velocity limits; half of the ranges, π or 1 m where there is none
+  detail::StartTable table;
+  std::optional<AnalyticIk> analytic;
+
+  // The distance to the nearest limit.
+  double margin(const JointVector& q) const noexcept;
+  // The least singular value of the task's rows.
+  double least_sigma(const detail::Descent& search, const JointVector& q) const noexcept;
+  bool redundant() const noexcept { return chain.dof() > options.task.rows(); }
+
+  PositionIkResult result(const detail::Descent& search, detail::DescentPoint& point, const JointVector& near,
+                          std::chrono::steady_clock::time_point start) const noexcept;
+  void closed_form_branches(const Pose& pose, const JointVector* near, detail::Branches& out) const noexcept;
+  void search_all(const detail::Descent& search, const Pose& pose, int starts, detail::Branches& out) const noexcept;
+};
+
+}  // namespace sigmaik
