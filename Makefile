@@ -16,8 +16,9 @@ export SKBUILD_CMAKE_DEFINE := SIGMAIK_WERROR=$(WERROR)
 help:  ## this list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1  /p' Makefile | awk '{printf "  %s %-12s", $$1, $$2; $$1=$$2=""; print}'
 
-demo: .venv/.demo .venv/.package  ## a 7-joint arm driven beyond its reach by every method: a plot and its numbers
-	$(BIN)/sigmaik reach --robot ufactory_xarm7 --path extended-line --method all --out build/demo
+demo: .venv/.demo .venv/.package  ## three arms driven to random poses: which servo arrives, as a picture and a table
+	$(BIN)/sigmaik arrival --robot ufactory_xarm7,franka_panda,ur10 --targets random --trials 60 --rate 500 \
+	  --servo guided,default,dls,pinv --out build/demo
 
 docs: .venv/.docs .venv/.test .venv/.package  ## the documentation site, in build/docs/html (part of `make test`)
 	@tools/setup_system.sh $(PYTHON) doxygen

@@ -175,7 +175,9 @@ def _steps_from_zeros(chain: sk.Chain, most: int) -> list[Trial]:
 
 
 def make_servo(name: str, chain: sk.Chain, rate: float) -> sk.Servo:
-    """A servo of `SERVOS`."""
+    """A servo of `SERVOS`, or one with a method by name. Error where there is neither."""
+    if name not in SERVOS:
+        return sk.Servo(chain, sk.methods.parse(name), dt=1.0 / rate)
     if name != "fixed":
         return sk.Servo(chain, dt=1.0 / rate, guided=name == "guided")
     rule = sk.JParse(gamma=0.02, adaptive=False)
@@ -197,7 +199,7 @@ def drive(
     settings: ArrivalSettings,
     progress: Callable[[], None] | None = None,
 ) -> Arrivals:
-    """Drives a servo of `SERVOS` to all targets. progress: called after each trial."""
+    """Drives a servo (see `make_servo`) to all targets. progress: called after each trial."""
     servo = make_servo(name, chain, settings.rate)
     ik = sk.PositionIk(chain)
     cycles = settings.cycles

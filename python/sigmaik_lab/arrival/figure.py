@@ -15,6 +15,7 @@ from .experiment import Arrivals
 __all__ = ["arrival_figure"]
 
 _STYLES = {"default": ("#0072B2", "-"), "guided": ("#D55E00", "-"), "fixed": ("#7A5C3E", (0, (5, 1.5)))}
+_OTHERS = [("#009E73", (0, (5, 1.5))), ("#555555", (0, (1.5, 1.5))), ("#CC79A7", (0, (4, 1, 1, 1)))]
 
 
 def arrival_figure(title: str, seconds: float, done: Mapping[str, Mapping[str, Arrivals]]) -> Figure:
@@ -27,10 +28,11 @@ def arrival_figure(title: str, seconds: float, done: Mapping[str, Mapping[str, A
         axes.set_visible(False)
     for i, (robot, servos) in enumerate(done.items()):
         axes = grid.flat[i]
+        others = iter(_OTHERS * len(servos))
         for servo, arrivals in servos.items():
             times = np.sort(arrivals.time[np.isfinite(arrivals.time)])
             share = 100.0 * np.arange(1, len(times) + 1) / len(arrivals.time)
-            colour, dash = _STYLES.get(servo, ("black", "-"))
+            colour, dash = _STYLES[servo] if servo in _STYLES else next(others)
             x, y = np.concatenate([[0.0], times, [seconds]]), np.concatenate([[0.0], share, share[-1:]])
             axes.step(x[: len(y)], y, where="post", color=colour, linestyle=dash, linewidth=1.4, label=servo)
         axes.set_title(robot, fontsize=10)

@@ -51,7 +51,9 @@ def options(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     add_arms(parser, "ufactory_xarm7", ", or all shipped arms (all)")
     parser.add_argument("--targets", choices=tuple(TARGETS), default="near", help="(%(default)s)")
-    parser.add_argument("--servo", default=",".join(SERVOS), metavar="LIST", help="some of %(default)s")
+    parser.add_argument(
+        "--servo", default=",".join(SERVOS), metavar="LIST", help="of %(default)s, or of methods: dls, pinv, …"
+    )
     defaults = ArrivalSettings()
     for option, kind, unit, text in _SETTINGS:
         value = getattr(defaults, option.removeprefix("--"))
@@ -63,9 +65,19 @@ def options(parser: argparse.ArgumentParser) -> None:
 def load(args: argparse.Namespace) -> Iterable[ArrivalExperiment]:
     names = ["targets", *(option.removeprefix("--") for option, _, _, _ in _SETTINGS)]
     settings = ArrivalSettings(**{name: getattr(args, name) for name in names})
-    servos = choices("servo", args.servo, SERVOS)
+    methods = [name for name in args.servo.split(",") if name not in SERVOS]
+    for name in methods:
+        _check_method(name)
+    servos = choices("servo", args.servo, [*SERVOS, *methods])
     arms = open_arms(args, sk.robots.names())
     return [ArrivalExperiment({arm.name: settings.with_limits(arm.chain) for arm in arms}, servos, settings)]
+
+
+def _check_method(name: str) -> None:
+    try:
+        sk.methods.parse(name)
+    except sk.Error as error:
+        raise ValueError(f"no servo '{name}'; there are {', '.join(SERVOS)}, and methods: {error}") from None
 
 
 def run(experiment: ArrivalExperiment, progress: Progress) -> Done:
