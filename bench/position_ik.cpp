@@ -9,6 +9,7 @@
 
 #include <benchmark/benchmark.h>
 
+#include <sigmaik/kinematics.hpp>
 #include <sigmaik/position_ik.hpp>
 
 namespace {

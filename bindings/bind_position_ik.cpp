@@ -107,8 +107,11 @@ void bind_inverse(py::module_& m) {
       "    r.q, r.status, r.error\n\n"
       "A Levenberg-Marquardt descent with an active set of limits, from the entries of a table of configurations "
       "whose\n"
-      "poses are closest to the target; the closed form where the arm has one (AnalyticIk). The same call gives the\n"
-      "same answer. Immutable, safe to share.");
+      "poses are closest to the target. Six joints with a spherical wrist (AnalyticIk), or with three parallel axes "
+      "as\n"
+      "Universal Robots' arms have, are solved in closed form. The same call gives the same answer. Immutable, safe "
+      "to\n"
+      "share.");
   def_init<PositionIkOptions>(
       c, std::tuple{parameter<Chain>("chain")}, 1, "",
       [](const Chain& chain, const PositionIkOptions& options) { return PositionIk(chain, options); });
@@ -118,7 +121,8 @@ void bind_inverse(py::module_& m) {
         "near: (n,) [rad or m]. The answer is then the nearest solution that a bounded search finds, in travel time\n"
         "max_i |q_i − near_i| / velocity limit_i (1 where there is no limit). Joints that may turn more than once are\n"
         "on the turn nearest to `near`, and a redundant arm is moved along its self-motion towards `near`.\n"
-        "Without `near` it is the first solution that is found, each joint on the turn nearest to 0.\n\n"
+        "Without `near` it is the first solution that is found, or of a closed form the one farthest from the limits,\n"
+        "each joint on the turn nearest to 0.\n\n"
         "Raises Error where `pose` is not a pose. A pose out of reach is UNREACHABLE, with the nearest pose found.")
       .def(
           "solve_all",
@@ -136,8 +140,9 @@ void bind_inverse(py::module_& m) {
           "Distinct solutions (k, n) [rad or m] of `pose` (4, 4), those far from the limits first; k = 0 where none "
           "is\n"
           "found.\n\n"
-          "Solutions that differ by whole turns count once: each joint is on the turn nearest to the middle of its\n"
-          "range. For a redundant arm the solutions are moved along their self-motion to a local minimum of the\n"
+          "Solutions that differ by whole turns, or by less than 0.01 rad, count once: each joint is on the turn "
+          "nearest\n"
+          "to the middle of its range. A redundant arm is moved along its self-motion to a local minimum of the\n"
           "distance to the middle of the ranges, and these minima are the representatives.")
       .def("branches", &branches, py::arg("pose"),
            "The solutions of solve_all() in the same order, each with its least singular value and its margin.")

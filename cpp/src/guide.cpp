@@ -36,24 +36,24 @@ GuideOwner::~GuideOwner() = default;
 
 namespace {
 
-constexpr double kStep = 4e-3;   // [s] of a predicted cycle: the servo's thresholds are still those of its own cycle
-constexpr double kAhead = 32.0;  // [s] of predicted motion in a second, so that a prediction takes a tenth of a second
-constexpr double kTakesLong = 1.5;    // [s] of predicted motion, from which on the search goes on at the same time
-constexpr double kSlices = 4000.0;  // [1/s] of the search
-constexpr double kQuiet = 0.02;     // [s] for which a target has to rest: a hand that drags it gets no prediction
-constexpr double kSame = 1e-3;      // [rad, or L] a target that moves by less is the same
-constexpr double kArrived = 1e-3;   // [L] of the position
-constexpr double kTurned = 2.5e-3;  // [rad] of the orientation
-constexpr double kPatience = 4.5;   // [s] that the servo's own way may take,
-constexpr double kLonger = 1.4;     // and this many times the joints' travel time
-constexpr double kStill = 0.2;      // [s] of rest that end a prediction
-constexpr double kStuck = 0.4;      // [s] of the prediction, in which the error has to fall
-constexpr double kProgress = 0.05;  // by this part of itself, or the servo is in a valley
-constexpr double kLate = 1.3;       // of the predicted time, until the servo counts as stuck,
-constexpr double kLateness = 0.3;   // [s] and this time more
-constexpr double kLed = 1e-4;       // [rad or m] from the goal: the joints are there
-constexpr double kAway = 1.0;       // [s] away from a target where the arm had arrived: somebody moved the arm
-constexpr double kOther = 0.5;      // [rad, or L] a joint that ends farther from the servo's own way changes its branch
+constexpr double kStep = 4e-3;    // [s] of a predicted cycle: the servo's thresholds are still those of its own cycle
+constexpr double kAhead = 32.0;   // [s] of predicted motion in a second, so that a prediction takes a tenth of a second
+constexpr double kLongWay = 1.5;  // [s] of predicted motion, from which on the search goes on at the same time
+constexpr double kSlices = 4000.0;    // [1/s] of the search
+constexpr double kQuiet = 0.02;       // [s] for which a target has to rest: a hand that drags it gets no prediction
+constexpr double kSameTarget = 1e-3;  // [rad, or L] a target that moves by less is the same
+constexpr double kArrived = 1e-3;     // [L] of the position
+constexpr double kTurned = 2.5e-3;    // [rad] of the orientation
+constexpr double kPatience = 4.5;     // [s] that the servo's own way may take,
+constexpr double kLonger = 1.4;       // and this many times the joints' travel time
+constexpr double kStill = 0.2;        // [s] of rest that end a prediction
+constexpr double kStuck = 0.4;        // [s] of the prediction, in which the error has to fall
+constexpr double kProgress = 0.05;    // by this part of itself, or the servo is in a valley
+constexpr double kLate = 1.3;         // of the predicted time, until the servo counts as stuck,
+constexpr double kLateness = 0.3;     // [s] and this time more
+constexpr double kLed = 1e-4;         // [rad or m] from the goal: the joints are there
+constexpr double kAway = 1.0;         // [s] away from a target where the arm had arrived: somebody moved the arm
+constexpr double kOther = 0.5;  // [rad, or L] a joint that ends farther from the servo's own way changes its branch
 
 ServoOptions of_predictor(const Servo& servo) {
   ServoOptions options = servo.options();
@@ -98,7 +98,8 @@ bool Guide::arrived(const Twist& error, const Servo& servo) const noexcept {
 void Guide::advise(const Pose& target, const Twist& error, const Servo& servo) noexcept {
   const Twist moved = pose_error(target_, target);
   const double length = ik_.chain().characteristic_length();
-  if (phase_ == Phase::Nothing || moved.head<3>().norm() > kSame * length || moved.tail<3>().norm() > kSame) {
+  if (phase_ == Phase::Nothing || moved.head<3>().norm() > kSameTarget * length ||
+      moved.tail<3>().norm() > kSameTarget) {
     begin(target);
   }
   time_ += servo.options().dt;
@@ -184,7 +185,7 @@ void Guide::predict(const Servo& servo) noexcept {
     return seek();
   }
   // A motion that takes long may be in vain.
-  if (predicted_ > kTakesLong) search(servo);
+  if (predicted_ > kLongWay) search(servo);
 }
 
 void Guide::seek() noexcept {

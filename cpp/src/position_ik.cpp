@@ -52,7 +52,7 @@ PositionIkResult PositionIk::solve(const Pose& pose) const noexcept {
   if (!acceptable(pose)) return {};
   const Descent search(m.problem, pose);
   Branches found(m.problem, kApart);
-  m.closed_form_branches(pose, nullptr, found);
+  m.closed_form_branches(search, pose, nullptr, found);
   DescentPoint point;
   if (found.count() > 0) {
     point.q = *std::max_element(found.begin(), found.end(),
@@ -85,8 +85,7 @@ std::vector<PositionIkBranch> PositionIk::solve_all(const Pose& pose) const {
           " m, or has a rotation that is none");
   const Descent search(m.problem, pose), local(m.on_turn, pose);
   Branches found(m.problem, kApart), distinct(m.problem, m.redundant() ? kApartRedundant : kApart);
-  m.closed_form_branches(pose, nullptr, found);
-  if (found.count() == 0) m.search_all(search, pose, m.options.starts, found);
+  if (!m.closed_form_branches(search, pose, nullptr, found)) m.search_all(search, pose, m.options.starts, found);
   std::vector<PositionIkBranch> out;
   for (const JointVector& q : found) {
     DescentPoint point;

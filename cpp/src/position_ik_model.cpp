@@ -17,9 +17,13 @@ using Clock = std::chrono::steady_clock;
 using detail::Branches;
 using detail::Descent;
 using detail::DescentPoint;
+using detail::Effort;
 using detail::kQuick;
 using detail::require;
 using detail::StartOrder;
+
+constexpr Effort kLastDigits{8, 0.5, false, false};  // of a closed form's solution
+constexpr double kRounding = 1e-6;                   // [rad] of a closed form's solution close to a singularity
 
 std::optional<AnalyticIk> closed_form(const Chain& chain) {
   try {
@@ -70,7 +74,8 @@ PositionIk::Model::Model(const Chain& arm, const PositionIkOptions& given)
       speed(speed_of(arm.limits())),
       half(half_of(arm.limits())),
       table(problem),
-      analytic(options.task.whole() ? closed_form(arm) : std::nullopt) {}
+      analytic(options.task.whole() ? closed_form(arm) : std::nullopt),
+      parallel(options.task.whole() ? detail::ParallelAxes::of(arm) : std::nullopt) {}
 
 // The distance to the nearest limit.
 double PositionIk::Model::margin(const JointVector& q) const noexcept {
@@ -106,17 +111,41 @@ PositionIkResult PositionIk::Model::result(const Descent& search, DescentPoint& 
   return out;
 }
 
-// The closed form's solutions inside the limits. At a singularity, where an angle is free, the one nearest to `near` is
-// not among those of solve().
-void PositionIk::Model::closed_form_branches(const Pose& pose, const JointVector* near, Branches& out) const noexcept {
-  if (!analytic) return;
-  if (near != nullptr) {
+// Puts each joint on the turn nearest to the middle of its range. Returns whether the limits hold then; what rounding
+// takes beyond a limit is put onto the limit.
+bool PositionIk::Model::within(JointVector& q) const noexcept {
+  constexpr double kTurn = 2.0 * std::numbers::pi;
+  const JointLimits& limits = chain.limits();
+  for (int i = 0; i < q.size(); ++i) {
+    q[i] += kTurn * std::round((middle[i] - q[i]) / kTurn);
+    if (q[i] < limits.lower[i] - kRounding || q[i] > limits.upper[i] + kRounding) return false;
+    q[i] = std::clamp(q[i], limits.lower[i], limits.upper[i]);
+  }
+  return true;
+}
+
+// The solutions of a closed form inside the limits. Returns whether these are all; where two solutions are almost one
+// or a joint is free, there may be more.
+bool PositionIk::Model::closed_form_branches(const Descent& search, const Pose& pose, const JointVector* near,
+                                             Branches& out) const noexcept {
+  if (parallel) {
+    const detail::ParallelAxes::Solutions found = parallel->solve(pose, near != nullptr ? (*near)[5] : zero[5]);
+    DescentPoint point;
+    for (int i = 0; i < found.count; ++i) {
+      point.q = found.q[static_cast<std::size_t>(i)];
+      if (within(point.q) && search.run(point, kLastDigits)) out.add(point.q);
+    }
+    return out.count() > 0 && !found.singular;
+  }
+  if (!analytic) return false;
+  if (near != nullptr) {  // at a singularity, where an angle is free, this one is not among those of solve()
     const AnalyticNearest nearest = analytic->nearest(pose, *near);
     if (nearest.status == AnalyticStatus::Ok && nearest.branch.within_limits) out.add(nearest.branch.q);
   }
   for (const AnalyticBranch& branch : analytic->solve(pose)) {
     if (branch.within_limits) out.add(branch.q);
   }
+  return out.count() > 0;
 }
 
 // The solutions that descents from the first entries of the table find.

@@ -7,6 +7,7 @@
 #include <sigmaik/analytic_ik.hpp>
 #include <sigmaik/position_ik.hpp>
 
+#include "parallel_axes.hpp"
 #include "position_ik_branches.hpp"
 #include "position_ik_descent.hpp"
 #include "position_ik_starts.hpp"
@@ -33,6 +34,7 @@ struct PositionIk::Model {
   JointVector speed, half;         // velocity limits; half of the ranges, π or 1 m where there is none
   detail::StartTable table;
   std::optional<AnalyticIk> analytic;
+  std::optional<detail::ParallelAxes> parallel;
 
   // The distance to the nearest limit.
   double margin(const JointVector& q) const noexcept;
@@ -42,7 +44,9 @@ struct PositionIk::Model {
 
   PositionIkResult result(const detail::Descent& search, detail::DescentPoint& point, const JointVector& near,
                           std::chrono::steady_clock::time_point start) const noexcept;
-  void closed_form_branches(const Pose& pose, const JointVector* near, detail::Branches& out) const noexcept;
+  bool within(JointVector& q) const noexcept;
+  bool closed_form_branches(const detail::Descent& search, const Pose& pose, const JointVector* near,
+                            detail::Branches& out) const noexcept;
   void search_all(const detail::Descent& search, const Pose& pose, int starts, detail::Branches& out) const noexcept;
 };
 

@@ -14,6 +14,7 @@ constexpr int kNearStarts = 48;  // starts of the table with which a search near
 constexpr int kPulled = 8;       // solutions of a redundant arm that are moved towards `near`
 constexpr int kPullSteps = 8;    // of a slice of this
 constexpr int kPulls = 5;        // slices
+constexpr double kSame = 1e-6;   // [rad, or L] solutions that differ by less are the same
 
 }  // namespace
 
@@ -80,7 +81,7 @@ NearestSearch::NearestSearch(const PositionIk& ik, const Pose& pose, const Joint
       near_(near),
       search_(model_->problem, pose),
       local_(model_->on_turn, pose),
-      found_(model_->problem, kApart),
+      found_(model_->problem, kSame),
       order_(model_->table, pose),
       least_(kInfinity) {}
 
@@ -139,8 +140,7 @@ bool NearestSearch::pull() noexcept {
 bool NearestSearch::advance() noexcept {
   switch (stage_) {
     case Stage::ClosedForm:
-      model_->closed_form_branches(pose_, &near_, found_);
-      if (found_.count() > 0) return rank();
+      if (model_->closed_form_branches(search_, pose_, &near_, found_)) return rank();
       stage_ = Stage::Near;
       return false;
     case Stage::Near:

@@ -96,6 +96,48 @@ double apart(const JointVector& a, const JointVector& b) {
   return (a - b).unaryExpr([](double x) { return std::abs(x - 2.0 * kPi * std::round(x / (2.0 * kPi))); }).maxCoeff();
 }
 
+// Six joints, axes 2, 3, 4 parallel, axes 5 and 6 that meet, everything else at random.
+Chain parallel_arm(Random& random) {
+  const Eigen::Vector3d second = random.unit(3);
+  Eigen::Vector3d axis[6], point[6];
+  const auto oblique = [&](const Eigen::Vector3d& other) {
+    for (;;) {
+      const Eigen::Vector3d one = random.unit(3);
+      if (one.cross(other).norm() > 0.5) return one;
+    }
+  };
+  for (auto& p : point) p = 0.4 * Eigen::Vector3d(random.vector(3));
+  axis[0] = oblique(second);
+  axis[1] = second;
+  axis[2] = random.chance(0.5) ? second : Eigen::Vector3d(-second);
+  axis[3] = random.chance(0.5) ? second : Eigen::Vector3d(-second);
+  axis[4] = oblique(second);
+  axis[5] = oblique(axis[4]);
+  point[5] = point[4] + random.normal() * 0.1 * axis[4];
+  Pose last = Pose::Identity();
+  std::vector<Segment> segments;
+  for (int i = 0; i < 6; ++i) {
+    Pose at = random.pose();
+    at.translation() = point[i] + 0.1 * random.normal() * axis[i];
+    Segment s;
+    s.joint_name = "j" + std::to_string(i);
+    s.link_name = "l" + std::to_string(i);
+    s.type = JointType::Revolute;
+    s.lower = -kPi;
+    s.upper = kPi;
+    s.origin = last.inverse() * at;
+    s.axis = at.linear().transpose() * axis[i];
+    last = at;
+    segments.push_back(s);
+  }
+  Segment tool;
+  tool.joint_name = "tool_joint";
+  tool.link_name = "tool";
+  tool.origin = random.pose(0.3);
+  segments.push_back(tool);
+  return Chain("base", segments);
+}
+
 Chain slider(double lower, double upper) {
   Segment s;
   s.joint_name = "slide";
@@ -166,6 +208,15 @@ TEST_CASE("poses at singularities are solved on each shipped arm: all zeros, a j
   }
 }
 
+TEST_CASE("a pose that is singular where two joints are at their limits is solved") {
+  const Chain& chain = test::arms().at("franka_panda");
+  JointVector q(7);
+  q << -2.8973, -1.7628, 0.540053725, -0.460039968, 0.0, 1.28243577, 0.0;
+  const PositionIkResult found = PositionIk(chain).solve(pose(chain, q));
+  CHECK(found.status == PositionIkStatus::Ok);
+  CHECK(inside(chain, found.q));
+}
+
 TEST_CASE("poses of random arms of 1 to 16 joints are solved, exactly inside the limits") {
   Random random(13);
   for (int n = 1; n <= 16; ++n) {
@@ -183,6 +234,21 @@ TEST_CASE("poses of random arms of 1 to 16 joints are solved, exactly inside the
       CAPTURE(n);
       CAPTURE(arm);
       CHECK(solved == 20);
+    }
+  }
+}
+
+TEST_CASE("poses of single precision are solved") {
+  for (const auto& [name, chain] : test::arms()) {
+    CAPTURE(name);
+    const PositionIk ik(chain);
+    Random random(15);
+    for (int k = 0; k < 200; ++k) {
+      const JointVector q = sample(random, chain);
+      Pose target;
+      target.matrix() = pose(chain, q).matrix().cast<float>().cast<double>();
+      CHECK(ik.solve(target, q).status == PositionIkStatus::Ok);
+      CHECK(ik.solve(target).status == PositionIkStatus::Ok);
     }
   }
 }
@@ -288,6 +354,49 @@ TEST_CASE("continuous joints turn the short way round, however many turns `near`
 
 // All solutions -------------------------------------------------------------------------------------------------------
 
+TEST_CASE(
+    "arms with three parallel axes, and axes 5 and 6 that meet: all solutions contain the configuration of the pose") {
+  Random random(33);
+  int singular = 0, whole = 0;
+  for (int arm = 0; arm < 30; ++arm) {
+    const Chain chain = parallel_arm(random);
+    const PositionIk ik(chain);
+    for (int k = 0; k < 20; ++k) {
+      const JointVector q = sample(random, chain);
+      const std::vector<PositionIkBranch> found = ik.solve_all(pose(chain, q));
+      double nearest = kInfinity;
+      for (const PositionIkBranch& branch : found) {
+        REQUIRE(reaches(chain, branch.q, pose(chain, q), 1e-9));
+        nearest = std::min(nearest, apart(branch.q, q));
+      }
+      singular += nearest > 1e-6;
+      whole += found.size() == 8;
+      const PositionIkResult near = ik.solve(pose(chain, q), q);
+      CHECK(near.status == PositionIkStatus::Ok);
+      CHECK((near.q - q).cwiseAbs().maxCoeff() < 1e-5);
+    }
+  }
+  CHECK(singular <= 3);
+  CHECK(whole > 60);  // of 600: eight solutions are usual for such arms
+}
+
+TEST_CASE(
+    "the closed form of three parallel axes has as many solutions as the search of an arm that is almost the same") {
+  const Chain& chain = test::arms().at("ur10");
+  std::vector<Segment> segments = chain.segments();
+  for (Segment& s : segments) {
+    if (s.joint_name == chain.joint_names()[3]) s.axis = (s.axis + 1e-7 * s.axis.unitOrthogonal()).normalized();
+  }
+  const PositionIk closed(chain), search(Chain(chain.base(), segments));
+  Random random(34);
+  int different = 0;
+  for (int k = 0; k < 100; ++k) {
+    const Pose target = pose(chain, sample(random, chain));
+    different += closed.solve_all(target).size() != search.solve_all(target).size();
+  }
+  CHECK(different <= 6);
+}
+
 TEST_CASE("all solutions are distinct, inside the limits, and the one with the largest margin comes first") {
   for (const auto& [name, chain] : test::arms()) {
     CAPTURE(name);
@@ -387,6 +496,12 @@ TEST_CASE("whole poses of an arm with few joints are unreachable, and no other c
         least = std::min(least, distance(sigmaik::pose_error(pose(chain, sample(random, chain)), target)));
       }
       CHECK(distance(found.error) <= least + 1e-6);
+      for (int i = 0; i < 200; ++i) {  // a minimum: no small motion inside the limits comes closer
+        const JointVector q = (found.q + 1e-4 * JointVector(random.unit(n)))
+                                  .cwiseMax(chain.limits().lower)
+                                  .cwiseMin(chain.limits().upper);
+        CHECK(distance(sigmaik::pose_error(pose(chain, q), target)) >= distance(found.error) - 1e-9);
+      }
     }
   }
 }
