@@ -1500,8 +1500,9 @@ class PositionIk:
         r.q, r.status, r.error
 
     A Levenberg-Marquardt descent with an active set of limits, from the entries of a table of configurations whose
-    poses are closest to the target; the closed form where the arm has one (AnalyticIk). The same call gives the
-    same answer. Immutable, safe to share.
+    poses are closest to the target. Six joints with a spherical wrist (AnalyticIk), or with three parallel axes as
+    Universal Robots' arms have, are solved in closed form. The same call gives the same answer. Immutable, safe to
+    share.
     """
     def __init__(self, chain: Chain, tolerance: numpy.typing.ArrayLike = (1e-06, 1e-06), *, mask: numpy.typing.ArrayLike | None = (1, 1, 1, 1, 1, 1), frame: typing.Literal['base', 'tool'] = 'base', starts: typing.SupportsInt | typing.SupportsIndex = 256) -> None:
         """
@@ -1524,7 +1525,8 @@ class PositionIk:
         near: (n,) [rad or m]. The answer is then the nearest solution that a bounded search finds, in travel time
         max_i |q_i − near_i| / velocity limit_i (1 where there is no limit). Joints that may turn more than once are
         on the turn nearest to `near`, and a redundant arm is moved along its self-motion towards `near`.
-        Without `near` it is the first solution that is found, each joint on the turn nearest to 0.
+        Without `near` it is the first solution that is found, or of a closed form the one farthest from the limits,
+        each joint on the turn nearest to 0.
 
         Raises Error where `pose` is not a pose. A pose out of reach is UNREACHABLE, with the nearest pose found.
         """
@@ -1533,8 +1535,8 @@ class PositionIk:
         Distinct solutions (k, n) [rad or m] of `pose` (4, 4), those far from the limits first; k = 0 where none is
         found.
 
-        Solutions that differ by whole turns count once: each joint is on the turn nearest to the middle of its
-        range. For a redundant arm the solutions are moved along their self-motion to a local minimum of the
+        Solutions that differ by whole turns, or by less than 0.01 rad, count once: each joint is on the turn nearest
+        to the middle of its range. A redundant arm is moved along its self-motion to a local minimum of the
         distance to the middle of the ranges, and these minima are the representatives.
         """
     def solve_batch(self, poses: numpy.typing.ArrayLike, threads: typing.SupportsInt | typing.SupportsIndex = 1) -> numpy.typing.NDArray[numpy.float64]:
