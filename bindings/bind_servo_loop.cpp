@@ -76,6 +76,8 @@ py::dtype sample_dtype(int dof) {
   add_array("singular_directions", py::make_tuple(6, 6));
   add("limiting_joints", "<u2");
   add("scale", "<f8");
+  add("guide", "i1");
+  add("guide_joints", "<u2");
   return py::dtype::from_args(fields);
 }
 
@@ -99,6 +101,8 @@ void write(const LoopSample& s, int dof, char* at) {
   record.put_columns(s.step.singular_directions);
   record.put(s.step.limiting_joints);
   record.put(s.step.scale);
+  record.put(static_cast<std::int8_t>(s.step.guide));
+  record.put(s.step.guide_joints);
 }
 
 py::array read(ServoLoop& loop) {
@@ -196,7 +200,7 @@ void bind_records(py::class_<ServoLoop>& c) {
         "holding),\n"
         "singular (bits), singular_directions (6, 6) (ServoStep's columns, NaN beyond them), limiting_joints "
         "(bits),\n"
-        "scale.")
+        "scale, guide (GuideState), guide_joints (bits).")
       .def_property_readonly("statistics", &ServoLoop::statistics)
       .def_property_readonly("dt", &ServoLoop::dt, "[s]")
       .def("__repr__", [](const ServoLoop& loop) {

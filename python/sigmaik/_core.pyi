@@ -972,7 +972,7 @@ class ServoLoop:
         cycle, time [s] since start(), command (LoopCommand), configuration, restarted, status (Status), q and qdot (n,), target and
         pose (4, 4) of the tip, pose_error, asked_twist and achieved_twist (6,), singular_values (NaN while holding),
         singular (bits), singular_directions (6, 6) (ServoStep's columns, NaN beyond them), limiting_joints (bits),
-        scale.
+        scale, guide (GuideState), guide_joints (bits).
         """
     def start(self) -> None:
         """
