@@ -90,6 +90,10 @@ class Driven:
     def status(self, attribute="status"):
         return self.tab.locator("#sk-status").get_attribute(f"data-{attribute}")
 
+    def guide(self):
+        """What the page says of the guide."""
+        return self.tab.locator("#sk-guide").inner_text()
+
 
 @pytest.fixture
 def drive(browser, tmp_path):

@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 import sigmaik as sk
-from sigmaik.teleop import Episode
+from sigmaik.teleop import Episode, Settings
 
 WHERE = (slice(150, 700), slice(450, 950))  # of the picture: the arm; the panel is to its right
 
@@ -94,6 +94,33 @@ def test_the_servo_keeps_its_rate_while_the_browser_draws(drive):
     # Without a graphics card the browser takes all cores there are; what is missed then is counted, and is little.
     assert session.statistics.rate > 0.7 * 500.0
     assert abs(shown - session.statistics.rate) < 0.1 * 500.0
+
+
+def test_the_guide_is_switched_on_and_says_what_it_does(drive):
+    page = drive("puma560", settings=Settings(guided=False, assumed_acceleration=1.0))  # slow, so that the text is seen
+    session, target = page.session, np.array([-0.3, -0.15, 0.9])
+    page.wait(lambda: session.latest is not None, "a sample")
+
+    def away():
+        return np.linalg.norm(session.latest["pose"][:3, 3] - target)
+
+    def at_rest_elsewhere():
+        followed = session.goal is not None and np.abs(session.goal[:3, 3] - target).max() < 1e-9
+        slow = np.abs(session.latest["qdot"]).max() < 1e-3
+        return followed and session.latest["command"] == sk.LoopCommand.POSE and slow
+
+    page.go_until(target, at_rest_elsewhere, "the tool's own way has ended")
+    assert away() > 0.05
+    assert page.guide() == "–"
+    page.control("guide").click()
+    page.wait(lambda: session.settings.guided, "guided")
+    page.wait(lambda: page.guide().startswith("changing branch: joints "), "the page says that joints change")
+    page.go_until(target, lambda: away() < 1e-3, "there")
+    page.wait(lambda: page.guide() == "direct", "the page says that the guide has ended")
+    page.control("guide").click()
+    page.wait(lambda: not session.settings.guided, "not guided")
+    page.wait(lambda: page.guide() == "–", "the page says that there is no guide")
+    assert page.errors == []
 
 
 def test_method_limits_and_mask_switch(drive):

@@ -125,6 +125,8 @@ def test_settings_change_without_a_kick(session):
         ({"on_limit": "break"}, "on_limit"),
         ({"on_limit": 3}, "on_limit"),
         ({"limits": "no"}, "limits"),
+        ({"guided": "yes"}, "guided"),
+        ({"guided": 1}, "guided"),
         ({"mask": (False,) * 6}, "mask"),
         ({"mask": (1, 2)}, "mask"),
         ({"frame": "world"}, "frame"),
@@ -180,7 +182,8 @@ def test_settings_are_the_servos_defaults():
     arm = sk.robots.load("ufactory_xarm7")
     servo = Settings().servo(arm, 1e-3, sk.robots.home("ufactory_xarm7"))
     ours, product = servo.options, sk.Servo(arm).options
-    assert {name for name in ours if not np.array_equal(ours[name], product[name])} == {"posture", "posture_gain"}
+    others = {name for name in ours if not np.array_equal(ours[name], product[name])}
+    assert others == {"posture", "posture_gain", "guided"}
     assert servo.method == sk.JParse(singular_posture=True)
     session = Session("ufactory_xarm7")
     assert session.length_scale == servo.length_scale == arm.characteristic_length
@@ -266,6 +269,7 @@ def test_parquet_columns(episode, tmp_path):
     np.testing.assert_allclose(columns["observation.velocity"], episode["qdot"], atol=1e-5)
     np.testing.assert_allclose(columns["action"], episode["asked_twist"], atol=1e-6)
     np.testing.assert_allclose(columns["pose"].reshape(-1, 4, 4), episode["pose"], atol=1e-6)
+    assert set(columns["guide"]) <= {state.name.lower() for state in sk.GuideState}
     assert set(columns["status"]) <= {status.name.lower() for status in sk.Status}
     assert set(columns["command"]) == {"pose", "twist", "stale", "hold"} & set(columns["command"])
     assert json.loads(table.schema.metadata[b"sigmaik"])["robot"] == "ufactory_xarm7"
@@ -290,6 +294,124 @@ def test_recording_has_a_beginning_an_end_and_a_longest():
             session.start_recording()
         until(lambda: (session.read(), session.recording_full)[1])
         assert len(session.stop_recording()) == 50
+
+
+# --- the guide
+
+
+def beyond_the_branch(session):
+    """A pose behind a PUMA 560 that the tool's own way misses by more than 5 cm."""
+    pose = latest(session)["pose"].copy()
+    pose[:3, 3] = -0.3, -0.15, 0.9
+    return pose
+
+
+def at_rest(session, target):
+    """Whether the arm follows the target and hardly moves any more, at the target or elsewhere."""
+    sample = latest(session)
+    return np.array_equal(sample["target"], target) and np.abs(sample["qdot"]).max() < 1e-3
+
+
+def distance(sample, target):
+    return np.linalg.norm(sample["pose"][:3, 3] - target[:3, 3])
+
+
+def recorded_way(guided):
+    """A recording from rest on, until the arm rests again. Also the distance at the end, and the newest sample."""
+    with Session("puma560", rate=500.0, pose_timeout=60.0, settings=Settings(guided=guided)) as session:
+        until(lambda: latest(session) is not None)
+        target = beyond_the_branch(session)
+        session.start_recording()
+        session.follow(target)
+        until(lambda: np.abs(latest(session)["qdot"]).max() > 0.1)
+        until(lambda: at_rest(session, target))
+        last = session.latest.copy()
+        return session.stop_recording(), distance(last, target), last
+
+
+@pytest.fixture(scope="module")
+def guided():
+    return recorded_way(True)
+
+
+@pytest.fixture(scope="module")
+def unguided():
+    return recorded_way(False)
+
+
+def test_the_guide_leads_where_the_tools_own_way_does_not_arrive(guided, unguided):
+    episode, left, last = guided
+    assert left < 1e-3
+    assert sk.GuideState.CHANGING_BRANCH in episode["guide"]
+    assert last["guide"] == sk.GuideState.DIRECT
+    assert episode.broken_limits() == {"position": 0, "velocity": 0, "acceleration": 0}
+    episode, left, _ = unguided
+    assert left > 0.05
+    assert set(episode["guide"]) == {sk.GuideState.OFF}
+    assert not episode["guide_joints"].any()
+
+
+def test_samples_say_what_the_servos_guide_does(guided):
+    episode, _, _ = guided
+    (settings,) = episode.settings.values()
+    assert settings.guided
+    twin = settings.servo(episode.arm.chain, episode.dt, episode.arm.home)
+    twin.reset(*episode.before)
+    joints = set()
+    for sample in episode.samples:
+        step = twin.update(sample["target"]) if sample["command"] == sk.LoopCommand.POSE else twin.hold()
+        assert sample["guide"] == step.guide
+        assert [i for i in range(16) if sample["guide_joints"] >> i & 1] == list(step.guide_joints)
+        joints |= set(step.guide_joints)
+    assert joints
+
+
+def test_a_guided_recording_plays_again_to_the_bit(guided, tmp_path):
+    episode, _, _ = guided
+    loaded = Episode.load(episode.save(tmp_path / "guided.npz"))
+    assert dict(loaded.settings) == dict(episode.settings)
+    for field in ("guide", "guide_joints"):
+        assert loaded[field].dtype == episode[field].dtype
+        np.testing.assert_array_equal(loaded[field], episode[field])
+    np.testing.assert_array_equal(loaded.play(), episode["q"])
+
+
+def test_a_recording_that_begins_and_switches_while_the_guide_leads_plays_again_to_the_bit():
+    with Session("puma560", rate=500.0, pose_timeout=60.0, settings=Settings(assumed_acceleration=2.0)) as session:
+        until(lambda: latest(session) is not None)
+        session.follow(beyond_the_branch(session))
+        until(lambda: latest(session)["guide"] == sk.GuideState.CHANGING_BRANCH)
+        session.start_recording()
+        until(lambda: latest(session)["guide"] == sk.GuideState.CHANGING_BRANCH and session.recorded > 0)
+        session.configure(guided=False)
+        until(lambda: latest(session)["guide"] == sk.GuideState.OFF)
+        session.configure(guided=True)
+        until(lambda: latest(session)["guide"] == sk.GuideState.CHANGING_BRANCH)
+        session.twist([0.0, 0.0, 0.05, 0.0, 0.0, 0.0])  # a twist is never overruled
+        until(lambda: latest(session)["command"] == sk.LoopCommand.TWIST)
+        assert latest(session)["guide"] == sk.GuideState.OFF
+        episode = session.stop_recording()
+    assert [s.guided for s in episode.settings.values()] == [True, False, True]
+    assert episode.broken_limits() == {"position": 0, "velocity": 0, "acceleration": 0}
+    np.testing.assert_array_equal(episode.play(), episode["q"])
+
+
+def test_a_recording_from_before_the_guide_plays_unguided_to_the_bit(unguided, tmp_path):
+    episode, _, _ = unguided
+    with np.load(episode.save(tmp_path / "new.npz")) as data:
+        arrays = {name: data[name] for name in data.files if not name.startswith("guide")}
+    meta = json.loads(str(arrays["meta"]))
+    for settings in meta["settings"].values():
+        del settings["guided"]
+    np.savez(tmp_path / "old.npz", **{**arrays, "meta": np.array(json.dumps(meta))})
+    old = Episode.load(tmp_path / "old.npz")
+    assert [s.guided for s in old.settings.values()] == [False]
+    assert old.samples.dtype == episode.samples.dtype
+    assert not old["guide"].any()
+    np.testing.assert_array_equal(old.play(), episode["q"])
+    # With a guide the recording would play another motion.
+    settings = {number: s.with_(guided=True) for number, s in old.settings.items()}
+    assert np.abs(Episode(old.samples, old.arm, old.dt, settings, old.before).play() - episode["q"]).max() > 0.1
 
 
 # --- through singularities
@@ -407,6 +529,27 @@ def test_gauges_say_what_a_sample_says(session):
     assert "= 0.200" in bars
     joints = gauges.joint_bars(sample["q"], sample["qdot"], session.chain, 0b100)
     assert joints.count("<span") == 2 * 7
+
+
+@pytest.mark.parametrize(
+    ("state", "joints", "words"),
+    [
+        (sk.GuideState.OFF, 0b1, "–"),
+        (sk.GuideState.DIRECT, 0b1, "direct"),
+        (sk.GuideState.SEARCHING, 0, "searching"),
+        (sk.GuideState.POSTURE, 0, "posture"),
+        (sk.GuideState.CHANGING_BRANCH, 0b1010, "changing branch: joints 2, 4"),
+        (sk.GuideState.CHANGING_BRANCH, 0b1000, "changing branch: joint 4"),
+        (sk.GuideState.CHANGING_BRANCH, 0, "changing branch"),
+        (sk.GuideState.UNREACHABLE, 0b1, "unreachable"),
+    ],
+)
+def test_the_page_says_what_the_guide_does(session, state, joints, words):
+    sample = latest(session).copy()
+    sample["guide"], sample["guide_joints"] = state, joints
+    text = gauges.status_text(sample, session.chain, "J-PARSE", session.statistics, session.rate)
+    assert f"data-guide='{state.name}'" in text
+    assert f">{words}</span>" in text
 
 
 def test_the_page_shows_a_status_that_it_has_no_words_for(session, monkeypatch):

@@ -6,7 +6,7 @@ A recording as an npz file (numpy.load reads the file, without pickles) has an a
     cycle, time [s], command (0 hold, 1 pose, 2 twist, 3 stale), configuration, restarted, status (sigmaik.Status),
     q (N, n), qdot (N, n), target (N, 4, 4), pose (N, 4, 4), pose_error (N, 6), asked_twist (N, 6),
     achieved_twist (N, 6), singular_values (N, min(6, n)), singular (bits), singular_directions (N, 6, 6),
-    limiting_joints (bits), scale
+    limiting_joints (bits), scale, guide (sigmaik.GuideState), guide_joints (bits)
 
 and joint_names, lower, upper, velocity, acceleration (n,) (the limits that the servo held), home (n,), before (2, n)
 (q and q̇ before the first cycle), urdf (the arm's text), and meta: JSON with robot, base, tip, dt, settings (a
@@ -15,7 +15,7 @@ configuration's number to its settings) and version.
 A recording as a parquet file (extra `viewer`) has a row for each cycle, and columns for tools of imitation learning:
 
     timestamp [s] from 0, frame_index, episode_index, observation.state (n,) q, observation.velocity (n,) q̇,
-    action (6,) the twist that was asked for [v; ω], pose (16,) the tip's, row by row, command, status (text)
+    action (6,) the twist that was asked for [v; ω], pose (16,) the tip's, row by row, command, status, guide (text)
 
 with the same meta in the schema's metadata.
 """
@@ -23,7 +23,9 @@ with the same meta in the schema's metadata.
 from __future__ import annotations
 
 import dataclasses
+import enum
 import json
+import math
 import pathlib
 import zipfile
 from collections.abc import Mapping
@@ -44,6 +46,12 @@ __all__ = ["Arm", "Episode"]
 Samples = NDArray[np.void]
 
 _LIMITS = ("lower", "upper", "velocity", "acceleration")
+#: Fields that older recordings do not have, with type, shape of a row, and value there.
+_LATER: dict[str, tuple[str, tuple[int, ...], float]] = {
+    "singular_directions": ("<f8", (6, 6), math.nan),
+    "guide": ("i1", (), int(sk.GuideState.OFF)),
+    "guide_joints": ("<u2", (), 0),
+}
 
 
 @dataclass(frozen=True)
@@ -199,8 +207,9 @@ class Episode:
             flat = pa.array(values.reshape(-1).astype(np.float32))
             return pa.FixedSizeListArray.from_arrays(flat, int(values.size // n))
 
-        statuses = [sk.Status(value).name.lower() for value in range(5)]
-        commands = [command.name.lower() for command in sk.LoopCommand]
+        def texts(field: str, names: type[enum.IntEnum]) -> Any:
+            return pa.DictionaryArray.from_arrays(self[field].astype(np.int8), [name.name.lower() for name in names])
+
         table = pa.table(
             {
                 "timestamp": pa.array((self["cycle"] - self["cycle"][0]) * self.dt),
@@ -210,8 +219,9 @@ class Episode:
                 "observation.velocity": vectors(self["qdot"]),
                 "action": vectors(self["asked_twist"]),
                 "pose": vectors(self["pose"]),
-                "command": pa.DictionaryArray.from_arrays(self["command"].astype(np.int8), commands),
-                "status": pa.DictionaryArray.from_arrays(self["status"].astype(np.int8), statuses),
+                "command": texts("command", sk.LoopCommand),
+                "status": texts("status", sk.Status),
+                "guide": texts("guide", sk.GuideState),
             }
         )
         meta = {"sigmaik": self._meta(), "joint_names": json.dumps(list(self.arm.chain.joint_names))}
@@ -222,16 +232,18 @@ def _episode(data: Any) -> Episode:
     meta = json.loads(str(data["meta"]))
     chain = sk.Chain.from_urdf(str(data["urdf"]), base=meta["base"], tip=meta["tip"])
     chain = chain.with_limits(**{name: data[name] for name in _LIMITS})
+    # A recording that says nothing of a guide is older than the guide: its servo had none.
     settings = {
-        int(number): Settings(**{**values, "mask": tuple(values["mask"])})
+        int(number): Settings(**{"guided": False, **values, "mask": tuple(values["mask"])})
         for number, values in meta["settings"].items()
     }
     skip = {*_LIMITS, "before", "joint_names", "home", "urdf", "meta"}
     arrays = {name: data[name] for name in data.files if name not in skip}
-    if "singular_directions" not in arrays:  # of an older recording
-        arrays["singular_directions"] = np.full((len(arrays["cycle"]), 6, 6), np.nan)
-    dtype = np.dtype([(name, values.dtype, values.shape[1:]) for name, values in arrays.items()])
-    samples = np.empty(len(arrays["cycle"]), dtype)
+    for name, (dtype, shape, empty) in _LATER.items():
+        if name not in arrays:
+            arrays[name] = np.full((len(arrays["cycle"]), *shape), empty, dtype)
+    fields = [(name, values.dtype, values.shape[1:]) for name, values in arrays.items()]
+    samples = np.empty(len(arrays["cycle"]), fields)
     for name, values in arrays.items():
         samples[name] = values
     before = data["before"]

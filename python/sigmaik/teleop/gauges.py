@@ -11,7 +11,7 @@ import numpy as np
 import sigmaik as sk
 from sigmaik._types import Array
 
-__all__ = ["joint_bars", "singular_bars", "status_text"]
+__all__ = ["guide_words", "joint_bars", "singular_bars", "status_text"]
 
 _GREEN, _AMBER, _RED, _GREY, _TRACK = "#2f9e44", "#e8890c", "#d6336c", "#868e96", "#e9ecef"
 _COLOURS = {
@@ -28,13 +28,19 @@ _WORDS = {
     sk.Status.HOLDING: "holding",
     sk.Status.BAD_INPUT: "bad input",
 }
+_GUIDE_COLOURS = {
+    sk.GuideState.SEARCHING: _AMBER,
+    sk.GuideState.POSTURE: _AMBER,
+    sk.GuideState.CHANGING_BRANCH: _AMBER,
+    sk.GuideState.UNREACHABLE: _RED,
+}
 _FONT = "font:12px/1.5 ui-monospace,monospace;padding:2px 12px"
 
 
 def status_text(
     sample: Any, chain: sk.Chain, method: str, statistics: sk.LoopStatistics, rate: float, replaying: str = ""
 ) -> str:
-    """Status, the joints that limit, asked and achieved twist, and the servo's rate."""
+    """Status, the joints that limit, what the guide does, asked and achieved twist, and the servo's rate."""
     status, command = sk.Status(int(sample["status"])), sk.LoopCommand(int(sample["command"]))
     word = _WORDS.get(status, status.name.lower().replace("_", " "))
     if command is sk.LoopCommand.STALE:
@@ -46,6 +52,7 @@ def status_text(
         f"<div id='sk-status' data-status='{status.name}' data-command='{command.name}' "
         f"style='font-size:15px;font-weight:600;color:{_COLOURS.get(status, _GREY)}'>{html.escape(word)}</div>",
         f"<div>{html.escape(method)}{' · at limits: ' + html.escape(', '.join(joints)) if joints else ''}</div>",
+        _guide_text(sk.GuideState(int(sample["guide"])), int(sample["guide_joints"])),
     ]
     for label, field in (("asked", "asked_twist"), ("achieved", "achieved_twist")):
         v = sample[field]
@@ -57,6 +64,24 @@ def status_text(
         f"{rate:.0f} Hz</div>"
     )
     return f"<div style='{_FONT}'>{''.join(rows)}</div>"
+
+
+def guide_words(state: sk.GuideState, joints: int) -> str:
+    """What the guide does; bit i of `joints`: joint i changes its branch. Joints are counted from 1, as in the bars."""
+    if state is sk.GuideState.OFF:
+        return "–"
+    words = state.name.lower().replace("_", " ")
+    numbers = [str(i + 1) for i in range(joints.bit_length()) if joints >> i & 1]
+    if state is not sk.GuideState.CHANGING_BRANCH or not numbers:
+        return words
+    return f"{words}: joint{'s' if len(numbers) > 1 else ''} {', '.join(numbers)}"
+
+
+def _guide_text(state: sk.GuideState, joints: int) -> str:
+    colour = _GUIDE_COLOURS.get(state)
+    style = f" style='color:{colour}'" if colour else ""
+    words = f"<span id='sk-guide' data-guide='{state.name}'{style}>{guide_words(state, joints)}</span>"
+    return f"<div style='white-space:pre'>{'guide':<9}{words}</div>"
 
 
 def singular_bars(sigma: Array, gamma: float | None, singular: int | None = None) -> str:

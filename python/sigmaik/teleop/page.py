@@ -123,6 +123,7 @@ class Page:
         self._sigma = gui.add_html("")
         self._joints = gui.add_html("")
         self._build_drive()
+        self._build_jog()
         self._build_rule()
         self._build_limits()
         self._build_record()
@@ -145,6 +146,13 @@ class Page:
                     return
                 self._guard(event, lambda: self._follow(event, self._moved_target(self._position.value)))
 
+            guided = gui.add_checkbox(
+                "guide",
+                self.session.settings.guided,
+                hint="where the tool's own way to a target that rests does not arrive, the joints take another way, "
+                "inside their limits; a twist (jog, device) is never overruled",
+            )
+            self._bind(guided, "guided", bool)
             home = gui.add_button("Put the arm back", hint="at once, where it started: it is a simulated arm")
             home.on_click(lambda event: self._guard(event, self._restart))
             device: Any = gui.add_dropdown("device", ("none", *DEVICES), hint="plugged into the servo's machine")
@@ -171,6 +179,8 @@ class Page:
             def _(event: Any) -> None:
                 self._guard(event, lambda: setattr(self, "_angular_speed", _number(turn.value, 0.0, 2.0)))
 
+    def _build_jog(self) -> None:
+        gui = self._server.gui
         with gui.add_folder("Jog: hold a button, or tap or hold a key", expand_by_default=False):
             for axis, (name, keys) in enumerate(zip(_AXES, _KEYS, strict=True)):
                 for sign, letter in zip((1.0, -1.0), keys, strict=True):

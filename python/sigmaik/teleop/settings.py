@@ -34,6 +34,7 @@ class Settings:
     mask: tuple[bool, ...] = (True,) * 6  #: rows (vx, vy, vz, ωx, ωy, ωz) that matter
     frame: Literal["base", "tool"] = "base"  #: axes of the mask's rows
     length_scale: float | None = None  #: [m] 1 rad weighs as much as this length; None: the arm's own
+    guided: bool = True  #: take another way to a pose target that the tool's own way does not reach
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -85,6 +86,7 @@ class Settings:
             length_scale=self.length_scale,
             mask=self.mask,
             frame=self.frame,
+            guided=self.guided,
         )
 
 

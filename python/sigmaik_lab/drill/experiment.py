@@ -49,7 +49,8 @@ def drill(
     progress: called with the part that is done
     """
     sessions = [
-        Session(robot, base=base, tip=tip, settings=Settings(method=method), rate=rate, pose_timeout=10.0)
+        # The guide would lead the joints past the singularities that the methods are to pass.
+        Session(robot, base=base, tip=tip, settings=Settings(method=method, guided=False), rate=rate, pose_timeout=10.0)
         for robot in robots
         for method in names
     ]
