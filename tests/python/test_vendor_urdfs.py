@@ -285,7 +285,7 @@ def test_an_arm_of_five_joints_keeps_its_position_and_gives_up_the_tilt():
         target[:3, :3] = turn(axis / np.linalg.norm(axis), rng.uniform(0.1, 0.25)) @ target[:3, :3]
         servo.reset(start)
         for _ in range(2000):
-            step = servo.update(target)
+            servo.update(target)
         error = sk.pose_error(servo.pose, target)
         assert np.linalg.norm(error[:3]) <= 1e-4
         assert np.linalg.norm(error[3:]) <= 0.5

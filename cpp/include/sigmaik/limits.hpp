@@ -170,7 +170,8 @@ class LimitTracker {
   /// (n,) [rad/s or m/s], of the last cycle.
   const JointVector& qdot() const noexcept { return v_; }
 
-  /// Whether each joint is slower than a thousandth of its velocity limit, or than 0.001 rad/s or m/s where it has none.
+  /// Whether each joint is slower than a thousandth of its velocity limit, or than 0.001 rad/s or m/s where it has
+  /// none.
   bool resting() const noexcept;
 
   /// Bit i: joint i is outside its position limits.
@@ -221,11 +222,11 @@ class LimitTracker {
   LimitOptions options_;
   double dt_, per_dt_;
   int n_ = 0;
-  Numbers lower_, upper_;        // [rad or m]
-  Numbers velocity_;             // V
-  Numbers acceleration_;         // A dt
-  Numbers jerk_;                 // J dt²
-  Numbers recovery_;             // [rad/s or m/s], infinite without a velocity limit
+  Numbers lower_, upper_;  // [rad or m]
+  Numbers velocity_;       // V
+  Numbers acceleration_;   // A dt
+  Numbers jerk_;           // J dt²
+  Numbers recovery_;       // [rad/s or m/s], infinite without a velocity limit
   double settling_time_ = 0.0;
   std::uint32_t with_jerk_ = 0;  // bit i: joint i has a jerk limit
   std::array<JerkMemory, kMaxJoints> jerk_states_{};

@@ -119,9 +119,9 @@ class Arrivals:
     angle: Array  #: (N,) [rad]
     rest: NDArray[np.bool_]  #: (N,) whether all joints rest at the end
     speed: Array  #: (N,) [rad/s or m/s] of the fastest joint at the end
+    excess: Array  #: (N,) the largest excess over a limit: part of the limit, and of positions rad or m; 0: none
     least: Array  #: (N,) [s] in which the joints can get to the nearest configuration that PositionIk finds; inf: none
     led: NDArray[np.bool_]  #: (N,) whether the guide led the joints away from the tool's own way
-    excess: Array  #: (N,) the largest excess over a limit: part of the limit, and of positions rad or m; 0: none
 
 
 def draw_trials(chain: sk.Chain, settings: ArrivalSettings) -> list[Trial]:
@@ -223,8 +223,7 @@ def drive(
         columns.append((*_judge(servo, q, qdot, error, settings.rate, start_qdot), least, led))
         if progress is not None:
             progress()
-    time, position, angle, rest, speed, excess, least, led = (np.array(column) for column in zip(*columns, strict=True))
-    return Arrivals(time, position, angle, rest, speed, least, led, excess)
+    return Arrivals(*(np.array(column) for column in zip(*columns, strict=True)))
 
 
 def joint_time(servo: sk.Servo, start: Array, goal: Array) -> float:
