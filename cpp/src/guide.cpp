@@ -47,12 +47,13 @@ constexpr double kTurned = 2.5e-3;    // [rad] of the orientation
 constexpr double kPatience = 4.5;     // [s] that the servo's own way may take,
 constexpr double kLonger = 1.4;       // and this many times the joints' travel time
 constexpr double kStill = 0.2;        // [s] of rest that end a prediction
-constexpr double kStuck = 0.4;        // [s] of the prediction, in which the error has to fall
-constexpr double kProgress = 0.05;    // by this part of itself, or the servo is in a valley
-constexpr double kLate = 1.3;         // of the predicted time, until the servo counts as stuck,
-constexpr double kLateness = 0.3;     // [s] and this time more
-constexpr double kLed = 1e-4;         // [rad or m] from the goal: the joints are there
-constexpr double kAway = 1.0;         // [s] away from a target where the arm had arrived: somebody moved the arm
+constexpr double kStuck = 0.4;        // [s], or
+constexpr double kStuckPart = 0.07;  // of the longest time that a joint takes through its range: in this time the error
+constexpr double kProgress = 0.05;   // has to fall by this part of itself, or the servo is in a valley
+constexpr double kLate = 1.3;        // of the predicted time, until the servo counts as stuck,
+constexpr double kLateness = 0.3;    // [s] and this time more
+constexpr double kLed = 1e-4;        // [rad or m] from the goal: the joints are there
+constexpr double kAway = 1.0;        // [s] away from a target where the arm had arrived: somebody moved the arm
 constexpr double kOther = 0.5;  // [rad, or L] a joint that ends farther from the servo's own way changes its branch
 
 ServoOptions of_predictor(const Servo& servo) {
@@ -71,7 +72,9 @@ PositionIkOptions of_search(const Servo& servo) {
 }  // namespace
 
 Guide::Guide(const Servo& servo)
-    : predictor_(servo.chain(), servo.method(), of_predictor(servo)), ik_(servo.chain(), of_search(servo)) {}
+    : predictor_(servo.chain(), servo.method(), of_predictor(servo)),
+      ik_(servo.chain(), of_search(servo)),
+      patience_(std::max(kStuck, kStuckPart * (servo.settling_time() - 3.0) / 3.0)) {}
 
 void Guide::set_method(const Method& method) {
   predictor_.set_method(method);
@@ -84,6 +87,7 @@ void Guide::begin(const Pose& target) noexcept {
   state_ = GuideState::Direct;
   searched_ = with_posture_ = false;
   search_.reset();
+  open_ = false;
   joints_ = 0;
   time_ = away_ = 0.0;
 }
@@ -116,6 +120,7 @@ void Guide::advise(const Pose& target, const Twist& error, const Servo& servo) n
         phase_ = Phase::Done;
       } else if (time_ > kLate * predicted_ + kLateness || stuck(error, servo.options().dt)) {
         end_ = servo.q();
+        open_ = false;
         with_posture_ ? choose_lead(servo) : seek();
       }
       break;
@@ -138,6 +143,7 @@ void Guide::start_prediction(const Servo& servo, bool with_posture) noexcept {
   with_posture_ = with_posture;
   predictor_.guided_posture_ = with_posture ? goal_ : JointVector();
   predictor_.reset(servo.q(), servo.qdot());
+  predictor_.nominal_ = servo.nominal_;
   predicted_ = 0.0;
   start_way();
   horizon_ = std::max(kPatience, with_posture ? kLonger * travel_time(servo.q()) : 0.0);
@@ -151,7 +157,7 @@ bool Guide::stuck(const Twist& error, double dt) noexcept {
     least_ = left;
     since_least_ = 0.0;
   }
-  return since_least_ > kStuck;
+  return since_least_ > patience_;
 }
 
 void Guide::start_way() noexcept {
@@ -182,7 +188,8 @@ void Guide::predict(const Servo& servo) noexcept {
     if (outcome == Outcome::Open && predicted_ < horizon_) continue;
     if (with_posture_) return choose_lead(servo);
     end_ = predictor_.q();
-    return seek();
+    open_ = outcome == Outcome::Open;
+    return searched_ ? after_search(servo) : seek();
   }
   // A motion that takes long may be in vain.
   if (predicted_ > kLongWay) search(servo);
@@ -196,20 +203,30 @@ void Guide::seek() noexcept {
 // Some slices of the search. Returns whether the search has ended.
 bool Guide::search(const Servo& servo) noexcept {
   if (searched_) return true;
-  if (!search_) search_.emplace(ik_, target_, servo.q());
+  if (!search_) {
+    const bool large = target_.translation().cwiseAbs().maxCoeff() > kLargest ||
+                       servo.q().cwiseAbs().maxCoeff() > kLargest;
+    if (large) return searched_ = true;
+    search_.emplace(ik_, target_, servo.q());
+  }
   const int slices = std::max(1, static_cast<int>(kSlices * servo.options().dt));
   for (int i = 0; i < slices && !searched_; ++i) searched_ = search_->advance();
   return searched_;
 }
 
-// The servo's own way does not arrive, and the search has ended.
+// The servo's own way does not arrive, as far as it was predicted, and the search has ended.
 void Guide::after_search(const Servo& servo) noexcept {
-  if (!search_->found()) {
+  if (!search_ || !search_->found()) {
     phase_ = Phase::Done;
     state_ = GuideState::Unreachable;
     return;
   }
   goal_ = search_->best().q;
+  horizon_ = kLonger * travel_time(servo.q());
+  if (open_ && horizon_ > predicted_) {  // a slow arm: the prediction goes on
+    phase_ = Phase::Predicting;
+    return;
+  }
   if (ik_.chain().dof() > servo.options().task.rows()) return start_prediction(servo, true);
   choose_lead(servo);
 }

@@ -2,7 +2,6 @@
 // The guide of a servo: whether the servo's own way arrives, and another way where it does not.
 
 #include <cstdint>
-
 #include <optional>
 
 #include <sigmaik/position_ik.hpp>
@@ -60,6 +59,7 @@ class Guide {
 
   Servo predictor_;
   PositionIk ik_;
+  double patience_;  // [s] in which the error has to fall
   std::optional<NearestSearch> search_;
   Phase phase_ = Phase::Nothing;
   GuideState state_ = GuideState::Off;
@@ -67,6 +67,7 @@ class Guide {
   JointVector goal_;           // joint positions of the target
   JointVector end_;            // of the servo's own way
   bool searched_ = false;      // the search has ended
+  bool open_ = false;          // the prediction of the servo's own way ended before the servo did
   bool with_posture_ = false;  // the prediction, and then the servo, has goal_ as its posture
   std::uint16_t joints_ = 0;
   double time_ = 0.0;         // [s] in this phase
