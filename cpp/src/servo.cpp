@@ -293,8 +293,9 @@ bool Servo::fade_in(JointVector& qdot, bool fade) noexcept {
 
 // Sends the command: from here on the command is history. `achieved`: the step holds the command's twist already.
 void Servo::take(ServoStep& step, bool achieved) noexcept {
-  if (tracker_.q().size() == 0) {
+  if (tracker_.q().size() == 0) {  // there is no position to command
     step.q = step.qdot = JointVector::Zero(chain_.dof());
+    step.status = Status::BadInput;
     return;
   }
   const bool changed = tracker_.advance(step.qdot);

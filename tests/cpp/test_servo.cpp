@@ -398,10 +398,10 @@ TEST_CASE("a target that is no pose or twist is refused, and leaves no trace whe
   }
 }
 
-TEST_CASE("before reset() the servo holds") {
+TEST_CASE("before reset() the servo commands nothing, and says that it has no position to command") {
   Servo servo(arms().at("ur10"), JParse{});
   CHECK(servo.q().size() == 0);
-  for (const ServoStep& step : {servo.update(Pose::Identity()), servo.update_twist(Twist::Zero())}) {
+  for (const ServoStep& step : {servo.update(Pose::Identity()), servo.update_twist(Twist::Zero()), servo.hold()}) {
     CHECK(step.status == Status::BadInput);
     CHECK(step.qdot.size() == 6);
     CHECK(step.qdot.isZero(0.0));

@@ -2,7 +2,7 @@
 /// \file layout.hpp
 /// A program and the library that it links must agree on the size of every public type. Where sizes differ (headers of
 /// another version, another Eigen, a compiler option that changes types), linking fails, and the message names the
-/// type: "undefined reference to sigmaik::detail::Layout<…Sized<sigmaik::ServoOptions, 528ul>…>::in_library".
+/// type: "undefined reference to sigmaik::detail::Layout<…Sized<sigmaik::ServoOptions, N>…>::in_library".
 ///
 /// Options for vector instructions (-mavx2, -march=native, EIGEN_MAX_ALIGN_BYTES) change no public type, because the
 /// matrices of types.hpp are unaligned.

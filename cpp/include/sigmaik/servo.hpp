@@ -205,7 +205,7 @@ class Servo {
   /// One cycle along a twist [v; ω], base axes, at the tip's origin. Real time.
   ServoStep update_twist(const Twist& twist) noexcept;
 
-  /// One cycle of the fastest stop that the limits allow, or of rest: Holding. Real time.
+  /// One cycle of the fastest stop that the limits allow, or of rest: Holding; before reset() BadInput. Real time.
   ServoStep hold() noexcept { return stop(Status::Holding); }
 
   /// Takes over from another servo of the same arm and dt, while the arm moves: rule and options are this servo's, and
