@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include <sigmaik/pose.hpp>
 #include <sigmaik/position_ik.hpp>
 #include <sigmaik/servo.hpp>
 

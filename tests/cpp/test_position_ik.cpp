@@ -154,7 +154,9 @@ Chain slider(double lower, double upper) {
 // Solutions -----------------------------------------------------------------------------------------------------------
 
 TEST_CASE("every pose of a configuration inside the limits is solved, on each shipped arm, exactly inside the limits") {
-  for (const auto& [name, chain] : test::arms()) {
+  for (const auto& [key, arm] : test::arms()) {
+    const std::string& name = key;
+    const Chain& chain = arm;
     CAPTURE(name);
     const PositionIk ik(chain);
     Random random(11);
@@ -175,7 +177,9 @@ TEST_CASE("every pose of a configuration inside the limits is solved, on each sh
 }
 
 TEST_CASE("poses at singularities are solved on each shipped arm: all zeros, a joint at zero, two joints at limits") {
-  for (const auto& [name, chain] : test::arms()) {
+  for (const auto& [key, arm] : test::arms()) {
+    const std::string& name = key;
+    const Chain& chain = arm;
     CAPTURE(name);
     const PositionIk ik(chain);
     Random random(12);
@@ -239,7 +243,9 @@ TEST_CASE("poses of random arms of 1 to 16 joints are solved, exactly inside the
 }
 
 TEST_CASE("poses of single precision are solved") {
-  for (const auto& [name, chain] : test::arms()) {
+  for (const auto& [key, arm] : test::arms()) {
+    const std::string& name = key;
+    const Chain& chain = arm;
     CAPTURE(name);
     const PositionIk ik(chain);
     Random random(15);
@@ -301,7 +307,9 @@ TEST_CASE("with a closed form the answer has the least travel time of all branch
 }
 
 TEST_CASE("the answer is hardly ever farther from `near` than the configuration that made the pose") {
-  for (const auto& [name, chain] : test::arms()) {
+  for (const auto& [key, arm] : test::arms()) {
+    const std::string& name = key;
+    const Chain& chain = arm;
     CAPTURE(name);
     const PositionIk ik(chain);
     Random random(22);
@@ -324,7 +332,9 @@ TEST_CASE("the answer is hardly ever farther from `near` than the configuration 
 }
 
 TEST_CASE("a configuration is its own nearest solution") {
-  for (const auto& [name, chain] : test::arms()) {
+  for (const auto& [key, arm] : test::arms()) {
+    const std::string& name = key;
+    const Chain& chain = arm;
     CAPTURE(name);
     const PositionIk ik(chain);
     Random random(23);
@@ -398,7 +408,9 @@ TEST_CASE(
 }
 
 TEST_CASE("all solutions are distinct, inside the limits, and the one with the largest margin comes first") {
-  for (const auto& [name, chain] : test::arms()) {
+  for (const auto& [key, arm] : test::arms()) {
+    const std::string& name = key;
+    const Chain& chain = arm;
     CAPTURE(name);
     const PositionIk ik(chain);
     Random random(31);
@@ -454,7 +466,9 @@ TEST_CASE("out of reach the answer is the nearest pose: a slider stops at its li
 }
 
 TEST_CASE("far out of reach each shipped arm points at the target, and says that it is unreachable") {
-  for (const auto& [name, chain] : test::arms()) {
+  for (const auto& [key, arm] : test::arms()) {
+    const std::string& name = key;
+    const Chain& chain = arm;
     CAPTURE(name);
     const PositionIk ik(chain, {.task = {{true, true, true, false, false, false}}});
     Random random(41);
@@ -596,7 +610,9 @@ TEST_CASE("answers are the same in every call, in a copy, in a batch and in any 
 
 #ifdef SIGMAIK_TEST_HEAP
 TEST_CASE("no call of solve() touches the heap") {
-  for (const auto& [name, chain] : test::arms()) {
+  for (const auto& [key, arm] : test::arms()) {
+    const std::string& name = key;
+    const Chain& chain = arm;
     CAPTURE(name);
     const PositionIk ik(chain);
     Random random(63);
