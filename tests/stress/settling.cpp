@@ -34,7 +34,7 @@ namespace {
 using namespace sigmaik;
 using test::Random;
 
-constexpr double kFade = 8.0;  // [s] after the settling time: e⁻⁸ of a velocity limit is at rest
+constexpr double kFade = 12.0;  // [s] after the settling time: e⁻¹² of what other joints make up for is at rest
 
 enum Target { kNear, kFar, kOutOfReach, kBeyondLimit, kZeroTwist, kTargets };
 constexpr std::array<const char*, kTargets> kTargetNames{"near", "anywhere", "out of reach", "beyond a joint limit",
