@@ -44,22 +44,31 @@ class Guide {
   enum class Phase : std::int8_t { Nothing, Waiting, Predicting, Searching, Following, Leading, Done };
   enum class Outcome : std::int8_t { Open, Arrives, Rests };
 
+  // The error of the task's rows: in characteristic lengths, and in radians.
+  struct Left {
+    double linear, angular;
+  };
+
+  bool same(const Pose& target) noexcept;
   void begin(const Pose& target) noexcept;
-  void start_prediction(const Servo& servo, bool with_posture) noexcept;
-  void predict(const Servo& servo) noexcept;
+  void restart() noexcept;
+  void start_prediction(const Left& left, const Servo& servo, bool with_posture) noexcept;
+  void predict(const Left& left, const Servo& servo) noexcept;
   bool search(const Servo& servo) noexcept;
-  void after_search(const Servo& servo) noexcept;
+  void after_search(const Left& left, const Servo& servo) noexcept;
   void choose_lead(const Servo& servo) noexcept;
   void seek() noexcept;
   Outcome run_prediction() noexcept;
-  void start_way() noexcept;
-  bool stuck(const Twist& error, double dt) noexcept;
-  bool arrived(const Twist& error, const Servo& servo) const noexcept;
+  void start_way(const Servo& servo) noexcept;
+  void rest(bool there, double dt) noexcept;
+  bool stuck(const Left& left, double dt) noexcept;
+  Left left(const Twist& error, const Servo& servo) const noexcept;
+  bool arrived(const Left& left) const noexcept;
+  double own_time(const Left& left, const Servo& servo) const noexcept;
   double travel_time(const JointVector& from) const noexcept;
 
   Servo predictor_;
   PositionIk ik_;
-  double patience_;  // [s] in which the error has to fall
   std::optional<NearestSearch> search_;
   Phase phase_ = Phase::Nothing;
   GuideState state_ = GuideState::Off;
@@ -77,6 +86,11 @@ class Guide {
   double least_ = 0.0;        // error of the motion that is watched, when it had fallen last
   double since_least_ = 0.0;  // [s] since then
   double away_ = 0.0;         // [s] for which the arm has been away from a target where it had arrived
+  double there_ = 0.0;        // [s] for which it has been there
+  double patience_ = 0.0;     // [s] in which the error has to fall
+  double steps_ = 0.0;        // of the prediction, that the cycles so far allow
+  double slices_ = 0.0;       // the same of the search
+  int leads_ = 0;             // to this target
 };
 
 }  // namespace sigmaik::detail

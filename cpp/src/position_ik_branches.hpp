@@ -15,13 +15,16 @@ class Branches {
 
   Branches(const DescentProblem& problem, double apart) noexcept : problem_(problem), apart_(apart) {}
 
-  // Takes a solution that is not there yet, while there is room.
-  void add(const JointVector& q) noexcept {
-    if (count_ == kMost) return;
-    for (const JointVector& other : *this) {
+  // Takes a solution that is not there yet, while there is room. `better`: it replaces one that is there.
+  void add(const JointVector& q, bool better = false) noexcept {
+    for (JointVector& other : *this) {
       const JointVector d = problem_.difference(q, other);
-      if ((d.array().square() <= apart_ * apart_ * problem_.reach.array()).all()) return;
+      if ((d.array().square() <= apart_ * apart_ * problem_.reach.array()).all()) {
+        if (better) other = q;
+        return;
+      }
     }
+    if (count_ == kMost) return;
     solutions_[static_cast<std::size_t>(count_++)] = q;
   }
 

@@ -13,6 +13,7 @@ namespace {
 
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
+constexpr double kRounding = 1e-10;  // [rad] of an angle
 constexpr double kTurn = 2.0 * std::numbers::pi;
 constexpr double kDamping = 1e-2, kLeast = 1e-5, kMost = 1e6;  // of the damping over E: at the start, least, most
 constexpr double kGrowth = 8.0;  // of the damping after a step that is not accepted; then twice, four times, … this
@@ -79,8 +80,10 @@ void DescentProblem::place(const JointRef& near, JointVector& q) const noexcept 
   for (int i = 0; i < q.size(); ++i) {
     if ((turning >> i & 1u) != 0) {
       q[i] += kTurn * std::round((near[i] - q[i]) / kTurn);
-      if (q[i] < limits.lower[i]) q[i] += kTurn * std::ceil((limits.lower[i] - q[i]) / kTurn);
-      if (q[i] > limits.upper[i]) q[i] -= kTurn * std::ceil((q[i] - limits.upper[i]) / kTurn);
+      // Rounding beyond a limit is no reason for a turn.
+      const double below = limits.lower[i] - kRounding - q[i], above = q[i] - limits.upper[i] - kRounding;
+      if (below > 0.0) q[i] += kTurn * std::ceil(below / kTurn);
+      if (above > 0.0) q[i] -= kTurn * std::ceil(above / kTurn);
     }
     q[i] = std::clamp(q[i], limits.lower[i], limits.upper[i]);
   }
@@ -209,7 +212,7 @@ void Descent::polish(DescentPoint& point) const noexcept {
   for (int i = 0; i < 3 && point.cost > 1e-24; ++i) {
     next.q = step(point, 0.0, nullptr, problem_.reach, expected);
     evaluate(next);
-    if (!(next.cost < 0.25 * point.cost)) return;
+    if (!(next.cost < 0.25 * point.cost) || !reached(next)) return;  // a tolerance may hold at the one error's expense
     point = next;
   }
 }

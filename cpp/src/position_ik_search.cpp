@@ -75,6 +75,15 @@ bool FirstSearch::advance() noexcept {
   return true;
 }
 
+bool follow_solution(const PositionIk& ik, const Pose& pose, JointVector& q) noexcept {
+  const Descent local(ik.model_->on_turn, pose);
+  DescentPoint point;
+  point.q = q;
+  if (!local.run(point, kQuick)) return false;
+  q = point.q;
+  return true;
+}
+
 NearestSearch::NearestSearch(const PositionIk& ik, const Pose& pose, const JointVector& near) noexcept
     : model_(ik.model_),
       pose_(pose),
@@ -147,7 +156,7 @@ bool NearestSearch::advance() noexcept {
       point_.q = near_.cwiseMax(model_->on_turn.lower).cwiseMin(model_->on_turn.upper);
       stage_ = Stage::NearLonger;
       if (local_.run(point_, kNear)) {
-        found_.add(point_.q);
+        found_.add(point_.q, true);  // on the turns of `near`, which rounding at a limit may have taken from another
         stage_ = Stage::Table;
       }
       return false;

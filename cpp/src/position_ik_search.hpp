@@ -38,6 +38,10 @@ class FirstSearch {
   DescentPoint best_, best_of_block_;
 };
 
+// Follows a solution of one pose to another pose that is near. Returns whether `q` is a solution now; otherwise `q` is
+// unchanged. A short descent.
+bool follow_solution(const PositionIk& ik, const Pose& pose, JointVector& q) noexcept;
+
 // The solution nearest to a configuration in travel time; see PositionIk::solve().
 class NearestSearch {
  public:

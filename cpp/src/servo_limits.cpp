@@ -115,10 +115,14 @@ void Servo::approach(ServoStep& step, bool redistributes) noexcept {
   step.qdot = step.qdot.cwiseMax(bounds.lower).cwiseMin(bounds.upper);
 }
 
-// Instead of the rule's answer: straight to joint positions, all joints in proportion, so that they stop there.
+// Instead of the rule's answer: straight to joint positions, all joints in proportion, so that they stop there. The
+// tool is no faster than the gains and the largest errors let it be, and starts as softly.
 void Servo::lead(const JointVector& goal, ServoStep& step) noexcept {
+  // No singularity delays joints by themselves, so their gain can be larger than that of the pose.
+  constexpr double kGain = 2.5;
   const JointVector asked = step.qdot;
-  const double gain = solver_.length_scale() / solver_.pace().lag;  // no singularity delays joints by themselves
+  const double gain = std::min(solver_.length_scale() / solver_.pace().lag,
+                               kGain * std::max(options_.gain_linear, options_.gain_angular));
   step.qdot = gain * (goal - tracker_.q());
   step.qdot *= tracker_.arrival(step.qdot, gain);
   double part = 1.0;
@@ -126,7 +130,12 @@ void Servo::lead(const JointVector& goal, ServoStep& step) noexcept {
     const double size = std::abs(step.qdot[i]), limit = tracker_.velocity_limit(i);
     if (size * part > limit) part = limit / size;
   }
-  step.qdot *= part;
+  const Twist twist = state_.jacobian.lazyProduct(step.qdot);
+  const double linear = options_.gain_linear * max_linear_error_;
+  const double angular = options_.gain_angular * options_.max_angular_error;
+  if (twist.head<3>().norm() * part > linear) part = linear / twist.head<3>().norm();
+  if (twist.tail<3>().norm() * part > angular) part = angular / twist.tail<3>().norm();
+  step.qdot *= std::min(1.0, fade_) * part;
   approach(step, false);
   judge(asked, step);
 }

@@ -301,3 +301,115 @@ TEST_CASE("a guided cycle touches no heap") {
     }
   }
 }
+
+namespace {
+
+// How often the guide began to lead, and how often its state changed, in `time`.
+struct Changes {
+  int leads = 0, states = 0;
+  double fastest = 0.0;  // [m/s] the tool
+};
+
+template <typename Target>
+Changes count_changes(Servo& servo, double time, Target&& target, const JointVector* offset = nullptr) {
+  Changes out;
+  GuideState last = GuideState::Off;
+  for (int cycle = 0; cycle < static_cast<int>(time / kDt); ++cycle) {
+    if (offset != nullptr) servo.measure(JointVector(servo.q() + *offset));
+    const ServoStep step = servo.update(target(cycle * kDt));
+    out.fastest = std::max(out.fastest, step.achieved_twist.head<3>().norm());
+    if (step.guide != last) ++out.states;
+    if (step.guide != last && step.guide == GuideState::ChangingBranch) ++out.leads;
+    last = step.guide;
+  }
+  return out;
+}
+
+}  // namespace
+
+TEST_CASE("a lead is no faster than the gains and the largest errors let the tool be, and starts as softly") {
+  Random random(101);
+  for (const char* name : {"ur10", "puma560"}) {
+    const Chain& chain = arms().at(name);
+    ServoOptions options;
+    options.dt = kDt;
+    options.guided = true;
+    options.max_linear_error = 0.05;
+    options.max_angular_error = 0.2;
+    options.soft_start = 0.5;
+    Servo servo(chain, JParse{}, options);
+    int leads = 0;
+    for (int trial = 0; trial < 6; ++trial) {
+      servo.reset(test::start_of(random, chain, 0.9));
+      const Pose target = pose(chain, test::start_of(random, chain, 0.9));
+      const Changes changes = count_changes(servo, 8.0, [&](double) { return target; });
+      leads += changes.leads;
+      CHECK(changes.fastest <= 0.05 * options.gain_linear * 1.1);
+    }
+    CHECK(leads > 0);
+  }
+}
+
+TEST_CASE("where the measured arm cannot get to the target, the guide leads three times and no more") {
+  const Chain& chain = arms().at("kuka_kr6_r900");
+  const JointLimits& limits = chain.limits();
+  JointVector q = (0.8 * limits.lower + 0.2 * limits.upper).array() + 0.3;
+  q[1] = limits.lower[1];
+  JointVector offset = JointVector::Zero(6);
+  offset[1] = 5e-3;  // the reference would have to go beyond the limit
+  Servo servo = guided(chain);
+  servo.reset(JointVector(q.array() + 0.1));
+  const Pose target = pose(chain, q);
+  CHECK(count_changes(servo, 40.0, [&](double) { return target; }, &offset).leads <= 3);
+  CHECK(test::at_rest(chain, servo.qdot()));
+}
+
+TEST_CASE("targets with noise, and targets that drift, do not make the guide go to and fro") {
+  for (const char* name : {"ur10", "ufactory_xarm7"}) {
+    const Chain& chain = arms().at(name);
+    Random random(100);
+    Servo servo = guided(chain);
+    for (int trial = 0; trial < 4; ++trial) {
+      CAPTURE(name);
+      CAPTURE(trial);
+      const JointVector q = test::start_of(random, chain, 0.9);
+      const Pose target = pose(chain, test::start_of(random, chain, 0.9));
+      servo.reset(q);
+      const auto noisy = [&](double) {
+        Pose out = target;
+        out.translation() += 1e-4 * random.vector(3);
+        return out;
+      };
+      CHECK(count_changes(servo, 8.0, noisy).states <= 12);
+      servo.reset(q);
+      const auto drifting = [&](double t) {
+        Pose out = target;
+        out.translation() += 0.01 * (t - 8.0) * Eigen::Vector3d(0.6, 0.64, 0.48);
+        return out;
+      };
+      CHECK(count_changes(servo, 8.0, drifting).leads <= 3);
+    }
+  }
+}
+
+TEST_CASE("rows that the mask leaves out do not matter to the guide") {
+  const Chain& chain = arms().at("ur10");
+  ServoOptions options;
+  options.dt = kDt;
+  options.guided = true;
+  options.task.mask = {true, true, true, false, false, false};
+  Servo servo(chain, JParse{}, options);
+  Random random(3);
+  for (int trial = 0; trial < 10; ++trial) {
+    const JointVector q = 2.0 * random.vector(6);
+    Pose target = pose(chain, q + 0.3 * random.vector(6));
+    JointVector ends[2];
+    for (int turned = 0; turned < 2; ++turned) {
+      if (turned == 1) target.linear() = (rotation_exp(Eigen::Vector3d(0.0, 0.0, 3.0)) * target.linear()).eval();
+      servo.reset(q);
+      for (int cycle = 0; cycle < 1500; ++cycle) servo.update(target);
+      ends[turned] = servo.q();
+    }
+    CHECK((ends[0] - ends[1]).cwiseAbs().maxCoeff() < 1e-9);
+  }
+}

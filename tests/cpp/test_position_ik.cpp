@@ -21,6 +21,7 @@
 #include "heap.hpp"
 #include "numbers.hpp"
 #include "random.hpp"
+#include "settling.hpp"
 
 namespace {
 
@@ -673,4 +674,24 @@ TEST_CASE("every status has a text") {
   CHECK(std::string(to_string(PositionIkStatus::Ok)) == "ok");
   CHECK(std::string(to_string(PositionIkStatus::Unreachable)) == "unreachable");
   CHECK(std::string(to_string(PositionIkStatus::BadInput)) == "bad input");
+}
+
+TEST_CASE("near a solution with joints at their limits is this solution") {
+  for (const char* name : {"ur10", "kuka_kr6_r900", "ufactory_xarm7"}) {
+    const Chain& chain = test::arms().at(name);
+    const PositionIk ik(chain);
+    test::Random random(12);
+    for (int trial = 0; trial < 100; ++trial) {
+      CAPTURE(name);
+      CAPTURE(trial);
+      JointVector q = test::start_of(random, chain, 0.9);
+      for (int i = 0; i < chain.dof(); ++i) {
+        const double limit = random.chance(0.5) ? chain.limits().lower[i] : chain.limits().upper[i];
+        if (random.chance(0.4) && std::isfinite(limit)) q[i] = limit;
+      }
+      const PositionIkResult found = ik.solve(pose(chain, q), q);
+      REQUIRE(found.status == PositionIkStatus::Ok);
+      CHECK((found.q - q).cwiseAbs().maxCoeff() < 1e-3);
+    }
+  }
 }

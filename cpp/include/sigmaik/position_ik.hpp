@@ -44,9 +44,12 @@
 
 namespace sigmaik {
 
+class PositionIk;
+
 namespace detail {
 class FirstSearch;
 class NearestSearch;
+bool follow_solution(const PositionIk& ik, const Pose& pose, JointVector& q) noexcept;
 }  // namespace detail
 
 /// Settings of a PositionIk.
@@ -127,6 +130,7 @@ class PositionIk {
  private:
   friend class detail::FirstSearch;
   friend class detail::NearestSearch;
+  friend bool detail::follow_solution(const PositionIk& ik, const Pose& pose, JointVector& q) noexcept;
   struct Model;
   std::shared_ptr<const Model> model_;
 };
