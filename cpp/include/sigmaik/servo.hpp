@@ -157,14 +157,15 @@ struct ServoStep {
 ///
 /// *Guide* (ServoOptions::guided). A servo lets the error of the pose fall, and may end at a position limit or at a
 /// singularity although another configuration has the tool at the target. A guided servo predicts its own motion
-/// towards a target that has rested for 20 ms. Where this motion does not arrive within 4.5 s (or 1.4 times the joints'
-/// own travel time), the guide searches the nearest configuration of the target (PositionIk). An arm with more joints
-/// than the task has rows first tries this configuration as a posture, and keeps the tool on its way. Otherwise the
-/// joints go straight to the configuration, inside all limits, and the tool leaves its way: GuideState::ChangingBranch.
-/// Where no configuration is found, the state is Unreachable, and the servo goes its own way. Prediction and search are
-/// cut into slices, so that a cycle stays bounded (some 50 µs more while the guide works, for a tenth to a third of a
-/// second), and they are deterministic. Where the servo's own way arrives, the commands are those of a servo without a
-/// guide. Targets that move, and twists, are never overruled. The constructor takes about 2 ms.
+/// towards a target that has rested for 0.1 s. Where this motion does not arrive within 4.5 s (or 1.4 times the travel
+/// time of the joints, or of the gains), the guide searches the nearest configuration of the target (PositionIk). An
+/// arm with more joints than the task has rows first tries this configuration as a posture, and keeps the tool on its
+/// way. Otherwise the joints go straight to the configuration, inside all limits, and the tool leaves its way:
+/// GuideState::ChangingBranch. Where no configuration is found, the state is Unreachable, and the servo goes its own
+/// way. Prediction and search are cut into slices, so that a cycle stays bounded (some 50 µs more while the guide
+/// works, for a tenth to a third of a second), and they are deterministic. Where the servo's own way arrives, the
+/// commands are those of a servo without a guide. Targets that move, and twists, are never overruled. The constructor
+/// takes about 2 ms.
 ///
 /// A servo remembers the motion that it commanded (LimitTracker), the posture, the fading after reset(), and
 /// guesses that make the next cycle cheap and continuous: decompositions and an active set.
