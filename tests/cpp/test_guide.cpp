@@ -287,6 +287,7 @@ TEST_CASE("an arm that is pushed away from a target where it had arrived comes b
   }
 }
 
+#ifdef SIGMAIK_TEST_HEAP
 TEST_CASE("a guided cycle touches no heap") {
   Random random(4);
   for (const char* name : {"ufactory_xarm7", "kuka_kr6_r900"}) {
@@ -301,6 +302,7 @@ TEST_CASE("a guided cycle touches no heap") {
     }
   }
 }
+#endif
 
 namespace {
 
