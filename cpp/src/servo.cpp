@@ -99,6 +99,7 @@ Servo::Servo(Chain chain, const Method& method, const ServoOptions& options)
   }
   solver_.set_pace(pace_of(tracker_, solver_.length_scale()));
   following_error_ = expected_error_ = JointVector::Zero(chain_.dof());
+  expect_motion();
   if (options.guided) guide_ = detail::GuideOwner(std::make_unique<detail::Guide>(*this));
 }
 

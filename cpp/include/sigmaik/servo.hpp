@@ -17,6 +17,27 @@
 #include <sigmaik/status.hpp>
 #include <sigmaik/velocity_solver.hpp>
 
+namespace sigmaik::detail {
+
+class Guide;
+// Owns a guide, which is copied with its servo.
+class GuideOwner {
+ public:
+  GuideOwner() noexcept;
+  explicit GuideOwner(std::unique_ptr<Guide> guide) noexcept;
+  GuideOwner(const GuideOwner& other);
+  GuideOwner(GuideOwner&& other) noexcept;
+  GuideOwner& operator=(GuideOwner other) noexcept;
+  ~GuideOwner();
+  Guide* operator->() const noexcept { return guide_.get(); }
+  explicit operator bool() const noexcept { return guide_ != nullptr; }
+
+ private:
+  std::unique_ptr<Guide> guide_;
+};
+
+}  // namespace sigmaik::detail
+
 namespace sigmaik {
 
 /// How the command gives way where a joint limit would be broken. While no limit would be broken, the command is the
@@ -79,25 +100,6 @@ enum class GuideState : std::int8_t {
 
 /// "off", "direct", "searching", "posture", "changing branch", "unreachable".
 const char* to_string(GuideState state) noexcept;
-
-namespace detail {
-class Guide;
-// Owns a guide, which is copied with its servo.
-class GuideOwner {
- public:
-  GuideOwner() noexcept;
-  explicit GuideOwner(std::unique_ptr<Guide> guide) noexcept;
-  GuideOwner(const GuideOwner& other);
-  GuideOwner(GuideOwner&& other) noexcept;
-  GuideOwner& operator=(GuideOwner other) noexcept;
-  ~GuideOwner();
-  Guide* operator->() const noexcept { return guide_.get(); }
-  explicit operator bool() const noexcept { return guide_ != nullptr; }
-
- private:
-  std::unique_ptr<Guide> guide_;
-};
-}  // namespace detail
 
 /// Answer of a cycle. By value, no heap.
 struct ServoStep {
