@@ -763,7 +763,8 @@ TEST_CASE("no jumps where the set of held joints changes, as commands move and a
   constexpr int kSteps = 300;
   double by_command = 0.0, over_rule = 0.0, by_state = 0.0, tool_by_state = 0.0, jump = 0.0;
   long switches = 0, steps = 0, swings = 0;
-  for (const auto& [key, shipped] : arms()) {
+  for (const auto& [key, arm] : arms()) {
+    const Chain& shipped = arm;
     const std::string& name = key;
     Random random(10);
     for (int repeat = 0; repeat < 40; ++repeat) {
