@@ -63,18 +63,42 @@ double part_within_pace(const Spectrum& spectrum, const std::array<double, kMaxT
   return fastest > 1.0 ? 1.0 / fastest : 1.0;
 }
 
+// How far u_i and v_i are undetermined, from 0 to 1: where σ_i vanishes, v_i is any vector of the null space, u_i any
+// of the left null space, and rounding alone chooses them.
+double vagueness(const Spectrum& spectrum, int i) noexcept {
+  constexpr double kKnown = 1e-6, kUnknown = 1e-9;  // of σ_max; rounding turns v_i by about 1e-16/kUnknown
+  const double relative = spectrum.sigma(i) / spectrum.sigma(0);
+  return std::clamp((kKnown - relative) / (kKnown - kUnknown), 0.0, 1.0);
+}
+
+// (n,) the largest square of each entry of a unit vector across the directions that are determined.
+JointVector room(const Spectrum& spectrum) noexcept {
+  JointVector out = JointVector::Ones(spectrum.cols());
+  for (int i = 0; i < spectrum.size(); ++i) out -= (1.0 - vagueness(spectrum, i)) * spectrum.v(i).cwiseAbs2();
+  return out.cwiseMax(0.0);
+}
+
 }  // namespace
 
 double detail::needed(const Spectrum& spectrum, const std::array<double, kMaxTask>& parts, double threshold,
                       const Pace& pace) noexcept {
-  double square = 0.0;
+  double square = 0.0, vague = 0.0;
   JointVector motion;  // Σ (share v_ij)²
   for (int i = spectrum.size() - 1; i >= 0 && spectrum.sigma(i) < threshold; --i) {
     const double share = std::min(1.0, 4.0 * (1.0 - spectrum.sigma(i) / threshold));
     const double part = share * parts[static_cast<std::size_t>(i)];
-    square += part * part;
     if (motion.size() == 0) motion = JointVector::Zero(spectrum.cols());
-    motion += (share * spectrum.v(i)).cwiseAbs2();
+    const double unknown = vagueness(spectrum, i);
+    square += part * part;
+    vague = std::max(vague, share * unknown);
+    motion += (1.0 - unknown) * (share * spectrum.v(i)).cwiseAbs2();
+  }
+  if (vague > 0.0) {
+    for (int i = spectrum.size(); i < spectrum.rows(); ++i) {
+      const double part = parts[static_cast<std::size_t>(i)];
+      square += vague * part * part;
+    }
+    motion += vague * room(spectrum);
   }
   if (square == 0.0) return 0.0;
   const double size = part_within_pace(spectrum, parts, threshold, pace) * std::sqrt(square);

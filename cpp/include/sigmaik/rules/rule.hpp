@@ -166,7 +166,9 @@ namespace detail {
 // at which c/σ keeps each joint within its velocity limit, and at which the answer does not change faster than ω: σ_i
 // falls by about L for each radian along v_i, so the loop that closes through σ_i has a gain of (c/σ²) L. One number
 // for all directions, so that the answer does not depend on the choice of u_i and v_i where two σ_i are the same. A
-// direction counts in full from 3/4 of `threshold` downwards, and not at all from `threshold` upwards.
+// direction counts in full from 3/4 of `threshold` downwards, and not at all from `threshold` upwards. Where σ_i
+// vanishes, and u_i and v_i are any vectors of the null spaces, the command along all such u_i and the largest motion
+// that such a v_i can give a joint count.
 double needed(const Spectrum& spectrum, const std::array<double, kMaxTask>& parts, double threshold,
               const Pace& pace) noexcept;
 
