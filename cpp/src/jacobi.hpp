@@ -106,6 +106,44 @@ SIGMAIK_INLINE bool polish(JacobiWork<length>& work, double noise) {
   return true;
 }
 
+// Small angles, usual at a warm start: series, exact to rounding, in place of square roots. `t` holds the tangents of
+// the doubled angles, halved, and then those of the angles.
+template <int width>
+SIGMAIK_INLINE void small_angles(double (&t)[width], double (&cosine)[width]) {
+#pragma GCC unroll 3
+  for (int j = 0; j < width; ++j) {
+    t[j] -= t[j] * t[j] * t[j];
+    const double tt = t[j] * t[j];
+    cosine[j] = 1.0 - tt * (0.5 - 0.375 * tt);
+  }
+}
+
+// The tangents t and cosines of the smaller angles that zero the inner products c of columns whose squares differ by d.
+template <int lanes, int width>
+SIGMAIK_INLINE void smaller_angles(const double (&c)[width], const double (&d)[width], double (&t)[width],
+                                   double (&cosine)[width]) {
+#pragma GCC unroll 2
+  for (int first = 0; first < width; first += lanes) {
+    auto cs = splat<lanes>(0.0), ds = splat<lanes>(1.0);
+#pragma GCC unroll 4
+    for (int i = 0; i < lanes; ++i) {
+      if (first + i >= width) break;
+      cs[i] = c[first + i];
+      ds[i] = d[first + i];
+    }
+    const auto sign = ds < 0.0 ? splat<lanes>(-2.0) : splat<lanes>(2.0);
+    const auto magnitude = ds < 0.0 ? -ds : ds;
+    const auto ts = sign * cs / (magnitude + square_root(ds * ds + 4.0 * cs * cs) + 1e-300);
+    const auto cosines = 1.0 / square_root(1.0 + ts * ts);  // ts: tan of the smaller angle
+#pragma GCC unroll 4
+    for (int i = 0; i < lanes; ++i) {
+      if (first + i >= width) break;
+      t[first + i] = ts[i];
+      cosine[first + i] = cosines[i];
+    }
+  }
+}
+
 // Rotates pairs of columns of w, and of r with them, until all are orthogonal; leaves their squares. Returns the number
 // of sweeps, or 0 with nothing done where squares or their squares would overflow or vanish.
 template <int k, int lanes, int length>
@@ -133,34 +171,10 @@ SIGMAIK_INLINE int orthogonalise(JacobiWork<length>& work, int max_sweeps) {
         t[j] = c[j] / (d[j] + __builtin_copysign(1e-300, d[j]));
         ratio = larger(ratio, __builtin_fabs(t[j]));
       }
-      if (ratio < 2e-3) {  // small angles, usual at a warm start: series, exact to rounding, for the square roots
-#pragma GCC unroll 3
-        for (int j = 0; j < Order::width; ++j) {
-          t[j] -= t[j] * t[j] * t[j];
-          const double tt = t[j] * t[j];
-          cosine[j] = 1.0 - tt * (0.5 - 0.375 * tt);
-        }
+      if (ratio < 2e-3) {
+        small_angles(t, cosine);
       } else {
-#pragma GCC unroll 2
-        for (int first = 0; first < Order::width; first += lanes) {
-          auto cs = splat<lanes>(0.0), ds = splat<lanes>(1.0);
-#pragma GCC unroll 4
-          for (int i = 0; i < lanes; ++i) {
-            if (first + i >= Order::width) break;
-            cs[i] = c[first + i];
-            ds[i] = d[first + i];
-          }
-          const auto sign = ds < 0.0 ? splat<lanes>(-2.0) : splat<lanes>(2.0);
-          const auto magnitude = ds < 0.0 ? -ds : ds;
-          const auto ts = sign * cs / (magnitude + square_root(ds * ds + 4.0 * cs * cs) + 1e-300);
-          const auto cosines = 1.0 / square_root(1.0 + ts * ts);  // ts: tan of the smaller angle
-#pragma GCC unroll 4
-          for (int i = 0; i < lanes; ++i) {
-            if (first + i >= Order::width) break;
-            t[first + i] = ts[i];
-            cosine[first + i] = cosines[i];
-          }
-        }
+        smaller_angles<lanes>(c, d, t, cosine);
       }
 #pragma GCC unroll 3
       for (int j = 0; j < Order::width; ++j) {
