@@ -150,13 +150,7 @@ JointVector ConstrainedIk::follow(const Twist& motion) noexcept {
 
 // The velocity to head for: `wanted`, slowed down to the velocity limits, and inside the heading bounds.
 JointVector ConstrainedIk::head(const JointVector& wanted) const noexcept {
-  JointVector out = wanted;
-  double part = 1.0;
-  for (int i = 0; i < chain_.dof(); ++i) {
-    const double size = std::abs(wanted[i]), limit = tracker_.velocity_limit(i);
-    if (size * part > limit) part = limit / size;
-  }
-  out *= part;
+  const JointVector out = tracker_.velocity_scale(wanted).part * wanted;
   const VelocityBounds heading = tracker_.heading();
   return out.cwiseMax(heading.lower).cwiseMin(heading.upper);
 }

@@ -354,6 +354,15 @@ double LimitTracker::least_acceleration() const noexcept {
   return least;
 }
 
+VelocityScale LimitTracker::velocity_scale(const JointVector& qdot) const noexcept {
+  VelocityScale out;
+  for (int i = 0; i < n_; ++i) {
+    const double size = std::abs(qdot[i]), limit = velocity_limit(i);
+    if (size * out.part > limit) out = {limit / size, i};
+  }
+  return out;
+}
+
 double LimitTracker::part_of_limit(int i, double velocity) const noexcept {
   const double limit = velocity_limit(i);
   return limit < kInfinity ? velocity / limit : velocity;

@@ -71,21 +71,12 @@ void Servo::count_reversals(const JointVector& qdot) noexcept {
 // part s of the rule's, the answer has the largest s, and of these the answer is the nearest to the rule's. Exact rows
 // have a part s of their own, which comes before that of the other rows.
 void Servo::slow_down(ServoStep& step) noexcept {
-  const int n = chain_.dof();
-  double part = 1.0;
-  int slowest = -1;
-  for (int i = 0; i < n; ++i) {
-    const double size = std::abs(step.qdot[i]), limit = tracker_.velocity_limit(i);
-    if (size * part > limit) {
-      part = limit / size;
-      slowest = i;
-    }
-  }
-  if (slowest < 0) return;
-  const bool whole = !has_exact() && solver_.spectrum().size() >= n;
+  const VelocityScale scale = tracker_.velocity_scale(step.qdot);
+  if (scale.joint < 0) return;
+  const bool whole = !has_exact() && solver_.spectrum().size() >= chain_.dof();
   if (options_.on_limit == OnLimit::Scale || whole || !slow_down_by_rows(step)) {
-    step.qdot *= part;
-    step.limiting_joints |= static_cast<std::uint16_t>(1u << slowest);
+    step.qdot *= scale.part;
+    step.limiting_joints |= static_cast<std::uint16_t>(1u << scale.joint);
   }
 }
 

@@ -125,11 +125,7 @@ void Servo::lead(const JointVector& goal, ServoStep& step) noexcept {
                                kGain * std::max(options_.gain_linear, options_.gain_angular));
   step.qdot = gain * (goal - tracker_.q());
   step.qdot *= tracker_.arrival(step.qdot, gain);
-  double part = 1.0;
-  for (int i = 0; i < chain_.dof(); ++i) {
-    const double size = std::abs(step.qdot[i]), limit = tracker_.velocity_limit(i);
-    if (size * part > limit) part = limit / size;
-  }
+  double part = tracker_.velocity_scale(step.qdot).part;
   const Twist twist = state_.jacobian.lazyProduct(step.qdot);
   const double linear = options_.gain_linear * max_linear_error_;
   const double angular = options_.gain_angular * options_.max_angular_error;

@@ -88,6 +88,12 @@ struct VelocityBounds {
   }
 };
 
+/// How much of a joint velocity the velocity limits leave.
+struct VelocityScale {
+  double part = 1.0;  ///< in [0, 1]
+  int joint = -1;     ///< whose limit decides; −1: none, the velocity is within all limits
+};
+
 /// Follows the command of an arm, q ← q + q̇ dt, and says before each cycle how fast each joint may go.
 ///
 ///     LimitTracker tracker(chain.limits(), 1e-3);
@@ -139,6 +145,8 @@ class LimitTracker {
 
   /// [rad/s or m/s], the velocity limit of joint i that is held; infinite where there is none.
   double velocity_limit(int i) const noexcept { return velocity_[static_cast<std::size_t>(i)]; }
+  /// The largest s in [0, 1] with s |q̇_i| ≤ velocity_limit(i) for each joint, and the joint that decides s.
+  VelocityScale velocity_scale(const JointVector& qdot) const noexcept;
   /// The velocity as a part of joint i's velocity limit; as it is where there is none.
   double part_of_limit(int i, double velocity) const noexcept;
   /// [rad/s² or m/s²], the acceleration limit of joint i that is held, the assumed one where the model has none;
