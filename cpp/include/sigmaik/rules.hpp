@@ -21,6 +21,7 @@
 #include <cstdint>
 #include <variant>
 
+#include <sigmaik/layout.hpp>
 #include <sigmaik/rules/adaptive_damped_least_squares.hpp>
 #include <sigmaik/rules/custom.hpp>
 #include <sigmaik/rules/damped_least_squares.hpp>
@@ -71,5 +72,7 @@ void validate(const Method& method);
 /// \param pace for JParse::adaptive and for an application's rules that need the pace
 Resolution resolve(const Method& method, const Spectrum& spectrum, const TaskVector& command, std::uint8_t angular,
                    const Pace& pace = {}) noexcept;
+
+SIGMAIK_SAME_LAYOUT(Method, Resolution, Pace);
 
 }  // namespace sigmaik

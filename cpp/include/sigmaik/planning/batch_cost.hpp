@@ -6,6 +6,8 @@
 #include <cstddef>
 #include <memory>
 
+#include <sigmaik/layout.hpp>
+
 namespace sigmaik::planning {
 
 /// A cost of joint positions with its gradient.
@@ -25,5 +27,7 @@ class BatchCost {
 
 /// Shared by the planners that use it.
 using BatchCostPtr = std::shared_ptr<const BatchCost>;
+
+SIGMAIK_SAME_LAYOUT(BatchCost);
 
 }  // namespace sigmaik::planning

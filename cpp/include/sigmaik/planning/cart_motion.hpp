@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include <sigmaik/layout.hpp>
 #include <sigmaik/planning/cart.hpp>
 #include <sigmaik/planning/cart_plane.hpp>
 
@@ -104,5 +105,7 @@ PlaneCartMotion plane_cart_motion(const PlanarPath& path, const AxisPair& start,
 /// \throws Error where an argument is out of its range
 PlaneCartMotion evaluate_plane_cart_motion(const PlanarPath& path, std::vector<double> xy, double radius,
                                            double margin = 0.0, double duration = 1.0);
+
+SIGMAIK_SAME_LAYOUT(CartMeasures, CartMotion, PlaneCartMotion);
 
 }  // namespace sigmaik::planning

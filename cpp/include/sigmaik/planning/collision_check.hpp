@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <string>
 
+#include <sigmaik/layout.hpp>
 #include <sigmaik/planning/arm_spheres.hpp>
 #include <sigmaik/planning/distance_field.hpp>
 #include <sigmaik/planning/trajectory.hpp>
@@ -36,5 +37,7 @@ class CollisionCheck {
   ArmSpheres spheres_;
   DistanceField field_;
 };
+
+SIGMAIK_SAME_LAYOUT(CollisionCheck);
 
 }  // namespace sigmaik::planning

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include <sigmaik/chain.hpp>
+#include <sigmaik/layout.hpp>
 #include <sigmaik/planning/batch_cost.hpp>
 #include <sigmaik/planning/joint_cost.hpp>
 
@@ -81,5 +82,7 @@ namespace costs {
 using planning::operator+;
 using planning::operator*;
 }  // namespace costs
+
+SIGMAIK_SAME_LAYOUT(Cost);
 
 }  // namespace sigmaik::planning

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <memory>
 
+#include <sigmaik/layout.hpp>
 #include <sigmaik/planning/batch_cost.hpp>
 #include <sigmaik/types.hpp>
 
@@ -37,5 +38,7 @@ using JointCostPtr = std::shared_ptr<const JointCost>;
 /// \throws Error where threads is below 1
 void evaluate(const JointCost& cost, std::size_t count, const double* q, double* value, double* gradient = nullptr,
               int threads = 1);
+
+SIGMAIK_SAME_LAYOUT(JointCost);
 
 }  // namespace sigmaik::planning

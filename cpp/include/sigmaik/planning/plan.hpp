@@ -7,6 +7,7 @@
 #include <optional>
 
 #include <sigmaik/chain.hpp>
+#include <sigmaik/layout.hpp>
 #include <sigmaik/planning/arm_spheres.hpp>
 #include <sigmaik/planning/cost.hpp>
 #include <sigmaik/planning/distance_field.hpp>
@@ -42,5 +43,7 @@ Trajectory gradient(const Chain& chain, const JointVector& start, const JointVec
 /// \throws Error as gradient()
 Trajectory stochastic(const Chain& chain, const JointVector& start, const JointVector& goal, const Cost& cost,
                       const StochasticOptions& options = {}, const std::optional<KeepClear>& obstacles = std::nullopt);
+
+SIGMAIK_SAME_LAYOUT(KeepClear);
 
 }  // namespace sigmaik::planning

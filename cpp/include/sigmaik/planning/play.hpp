@@ -4,6 +4,7 @@
 
 #include <vector>
 
+#include <sigmaik/layout.hpp>
 #include <sigmaik/planning/trajectory.hpp>
 #include <sigmaik/servo.hpp>
 #include <sigmaik/status.hpp>
@@ -44,5 +45,7 @@ struct Playback {
 /// \throws Error where the trajectory is empty or has another number of joints, the servo stands elsewhere (1e-6 rad or
 ///     m), or settle is not finite or negative
 Playback play(const Trajectory& trajectory, Servo& servo, double settle = 0.5);
+
+SIGMAIK_SAME_LAYOUT(Playback);
 
 }  // namespace sigmaik::planning
