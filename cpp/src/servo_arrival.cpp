@@ -73,11 +73,17 @@ void Servo::count_reversals(const JointVector& qdot) noexcept {
 void Servo::slow_down(ServoStep& step) noexcept {
   const VelocityScale scale = tracker_.velocity_scale(step.qdot);
   if (scale.joint < 0) return;
-  const bool whole = !has_exact() && solver_.spectrum().size() >= chain_.dof();
-  if (options_.on_limit == OnLimit::Scale || whole || !slow_down_by_rows(step)) {
-    step.qdot *= scale.part;
-    step.limiting_joints |= static_cast<std::uint16_t>(1u << scale.joint);
+  const JointVector asked = step.qdot, scaled = scale.part * asked;
+  const bool by_priority = has_exact() && lost_ < 1.0, together = !has_exact() || lost_ > 0.0;
+  JointVector first = scaled, second = scaled;
+  bool by_rows = false;
+  if (options_.on_limit != OnLimit::Scale) {
+    if (by_priority) by_rows = slow_down_by_rows(asked, true, first, step);
+    const bool whole = solver_.spectrum().size() >= chain_.dof();
+    if (together && !whole) by_rows = slow_down_by_rows(asked, false, second, step) || by_rows;
   }
+  if (!by_rows) step.limiting_joints |= static_cast<std::uint16_t>(1u << scale.joint);
+  step.qdot = has_exact() ? mixed(first, second) : second;
 }
 
 // In x = q̇ − q̇_rule and t = (1 − s)/k: min |x|² + |t|² + |z|² where the rows' parts of x + k t q̇_rule are zero. In the
@@ -85,45 +91,45 @@ void Servo::slow_down(ServoStep& step) noexcept {
 // With exact rows there are two groups of rows, and the second group consists of the other rows' part that leaves the
 // exact rows as they are. Singular directions of this part may be missed, by z: the row is (σ_i/w_i) v_iᵀ, and z_i has
 // the weight 1 − σ_i/w_i. Returns false where the numbers are too far apart.
-bool Servo::slow_down_by_rows(ServoStep& step) noexcept {
+bool Servo::slow_down_by_rows(const JointVector& asked, bool by_priority, JointVector& qdot, ServoStep& step) noexcept {
   constexpr double kSlower = 1e-3;      // k: slower motion costs 1/k² times as much as another motion of the joints
   constexpr double kSlowerRest = 3e-2;  // of the rows that are not exact: a thousand times less
   const int n = chain_.dof();
-  const Spectrum& spectrum = has_exact() ? exact_spectrum_ : solver_.spectrum();
+  const Spectrum& spectrum = by_priority ? exact_spectrum_ : solver_.spectrum();
   const int first = static_cast<int>(spectrum.size());
-  const int second = has_exact() && rest_.rows() != 0 ? static_cast<int>(rest_spectrum_.size()) : 0;
+  const int second = by_priority && rest_.rows() != 0 ? static_cast<int>(rest_spectrum_.size()) : 0;
   const int groups = second > 0 ? 2 : 1, unknowns = n + groups + second;
-  const double largest = step.qdot.cwiseAbs().maxCoeff();
+  const double largest = asked.cwiseAbs().maxCoeff();
   problem_.C.setZero(first + second, unknowns);
   problem_.d.setZero(first + second);
   problem_.lower.setConstant(unknowns, -kInfinity);
   problem_.upper.setConstant(unknowns, kInfinity);
   for (int i = 0; i < first; ++i) {
     problem_.C.row(i).head(n) = spectrum.v(i).transpose();
-    problem_.C(i, n) = kSlower * spectrum.v(i).dot(step.qdot) / largest;
+    problem_.C(i, n) = kSlower * spectrum.v(i).dot(asked) / largest;
   }
   for (int i = 0; i < second; ++i) {
     const double weight = rest_resolution_.weight[static_cast<std::size_t>(i)];
     const double regular = weight > 0.0 ? std::min(1.0, rest_spectrum_.sigma(i) / weight) : 0.0;
     problem_.C.row(first + i).head(n) = regular * rest_spectrum_.v(i).transpose();
-    problem_.C(first + i, n + 1) = regular * kSlowerRest * rest_spectrum_.v(i).dot(step.qdot) / largest;
+    problem_.C(first + i, n + 1) = regular * kSlowerRest * rest_spectrum_.v(i).dot(asked) / largest;
     problem_.C(first + i, n + groups + i) = 1.0 - regular;
   }
   for (int i = 0; i < n; ++i) {
     const double limit = tracker_.velocity_limit(i);
-    problem_.lower[i] = (-limit - step.qdot[i]) / largest;
-    problem_.upper[i] = (limit - step.qdot[i]) / largest;
+    problem_.lower[i] = (-limit - asked[i]) / largest;
+    problem_.upper[i] = (limit - asked[i]) / largest;
   }
   problem_.lower.segment(n, groups).setZero();
   problem_.upper[n] = 1.0 / kSlower;
   if (groups > 1) problem_.upper[n + 1] = 1.0 / kSlowerRest;
   const LeastSquaresSolution solution = slowing_.solve(problem_);
   if (solution.status != LeastSquaresStatus::Optimal) return false;
-  step.qdot += largest * solution.x.head(n);
+  qdot = asked + largest * solution.x.head(n);
   step.limiting_joints |= static_cast<std::uint16_t>((solution.at_lower | solution.at_upper) & ((1u << n) - 1u));
   for (int i = 0; i < n; ++i) {
     const double limit = tracker_.velocity_limit(i);
-    step.qdot[i] = std::clamp(step.qdot[i], -limit, limit);
+    qdot[i] = std::clamp(qdot[i], -limit, limit);
   }
   return true;
 }

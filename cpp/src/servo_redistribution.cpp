@@ -29,17 +29,24 @@ void raise(const Spectrum& spectrum, const Resolution& resolution, TaskJacobian&
 }  // namespace
 
 JointVector Servo::redistribute(const JointVector& qdot, const VelocityBounds& bounds, ServoStep& step) noexcept {
+  if (!has_exact() || lost_ == 1.0) return redistribute_together(qdot, bounds, step);
+  const JointVector by_priority = redistribute_by_priority(qdot, bounds, step);
+  return lost_ == 0.0 ? by_priority : mixed(by_priority, redistribute_together(qdot, bounds, step));
+}
+
+JointVector Servo::redistribute_together(const JointVector& qdot, const VelocityBounds& bounds,
+                                         ServoStep& step) noexcept {
   const Spectrum& spectrum = solver_.spectrum();
   const Resolution& resolution = solver_.resolution();
-  const double largest = spectrum.sigma(0);
-  if (!has_exact()) {
-    rows_.setZero(spectrum.size(), chain_.dof());
-    for (int i = 0; i < spectrum.size(); ++i) {
-      rows_.row(i) = resolution.weight[static_cast<std::size_t>(i)] * spectrum.v(i).transpose();
-    }
-    return nearest(qdot, rows_, rows_.lazyProduct(qdot), largest, qdot, bounds, step);
+  rows_.setZero(spectrum.size(), chain_.dof());
+  for (int i = 0; i < spectrum.size(); ++i) {
+    rows_.row(i) = resolution.weight[static_cast<std::size_t>(i)] * spectrum.v(i).transpose();
   }
+  return nearest(qdot, rows_, rows_.lazyProduct(qdot), spectrum.sigma(0), qdot, bounds, step);
+}
 
+JointVector Servo::redistribute_by_priority(const JointVector& qdot, const VelocityBounds& bounds,
+                                            ServoStep& step) noexcept {
   // First, the problem has the exact rows alone.
   TaskJacobian first = weighted_rows(exact_);
   raise(exact_spectrum_, exact_resolution_, first);
@@ -58,7 +65,7 @@ JointVector Servo::redistribute(const JointVector& qdot, const VelocityBounds& b
   TaskVector goal(exact + rest);
   goal.head(exact) = kExactWeight * first.lazyProduct(begin);
   goal.tail(rest) = second.lazyProduct(qdot);
-  return nearest(begin, rows_, goal, largest, qdot, bounds, step);
+  return nearest(begin, rows_, goal, solver_.spectrum().sigma(0), qdot, bounds, step);
 }
 
 // Minimises |rows q̇ − goal|² + λ² |q̇ − begin|² inside the bounds, then once more with the answer in place of `begin`.

@@ -353,6 +353,41 @@ TEST_CASE("exact position rows: towards targets 0.3 rad beyond each joint's limi
   }
 }
 
+TEST_CASE("exact position rows: the arm follows a target beyond its reach without shaking") {
+  for (const auto& [key, start] : four_postures()) {
+    const std::string& name = key;
+    const Chain& chain = arms().at(name);
+    CAPTURE(name);
+    ServoOptions options;
+    options.exact = kPosition;
+    Servo servo(chain, JParse{}, options);
+    servo.reset(start);
+    const Pose from = servo.tip();
+    const double far = 1.3 * from.translation().norm() + 0.4;
+    JointVector last = JointVector::Zero(chain.dof()), change = last;
+    int turns = 0;
+    double moved = 0.0;
+    for (int cycle = 0; cycle < 8000; ++cycle) {
+      const double t = 1e-3 * cycle, part = std::min(1.0, 0.5 * t);
+      const Eigen::Vector3d way(1.0, 0.3 * std::sin(t), 0.2 * std::sin(0.7 * t));
+      Pose target = from;
+      target.translation() = part * far * way.normalized() + (1.0 - part) * from.translation();
+      const ServoStep step = servo.update(target);
+      const JointVector now = (step.qdot - last) / 1e-3;
+      if (t > 4.0) {  // the arm is stretched out
+        for (int i = 0; i < chain.dof(); ++i) {
+          if (now[i] * change[i] < 0.0 && std::abs(now[i]) > 1.0) ++turns;  // of the acceleration, and not of rounding
+        }
+        moved += 1e-3 * step.qdot.norm();
+      }
+      last = step.qdot;
+      change = now;
+    }
+    CHECK(turns == 0);
+    CHECK(moved > 0.3);
+  }
+}
+
 TEST_CASE("another rule goes on towards a target that has rested for longer than the settling time") {
   const Chain& chain = arms().at("ur10");
   ServoOptions options;

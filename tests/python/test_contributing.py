@@ -98,7 +98,8 @@ def with_bindings(root):
     pybind11 = pytest.importorskip("pybind11")
     if not (PYTHON / "Python.h").exists():
         pytest.skip("needs the headers of Python")
-    return [f"-I{root / 'bindings'}", f"-isystem{PYTHON}", f"-isystem{pybind11.get_include()}"]
+    version = '-DSIGMAIK_VERSION="0"'
+    return [f"-I{root / 'bindings'}", f"-isystem{PYTHON}", f"-isystem{pybind11.get_include()}", version]
 
 
 @needs_compiler

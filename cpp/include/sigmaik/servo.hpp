@@ -79,7 +79,8 @@ struct ServoOptions {
   LimitOptions limits{};     ///< which of the chain's limits are held; see limits.hpp
   OnLimit on_limit = OnLimit::Redistribute;  ///< what gives way where a joint limit would be broken
   /// Rows (vx, vy, vz, ωx, ωy, ωz), in the task's axes, that come before the others in every cycle: the other rows have
-  /// the motion that leaves these rows as they are.
+  /// the motion that leaves these rows as they are. As far as a singularity keeps these rows from being done, as beyond
+  /// the reach, all rows are done together: a strict priority would shake the arm there.
   std::array<bool, 6> exact{};
   std::optional<double> length_scale{};  ///< [m], see VelocitySolver; none: Chain::characteristic_length()
   Task task{};                           ///< which rows of the twist matter, and in which axes
@@ -257,6 +258,7 @@ class Servo {
   // servo_priority.cpp
   bool has_exact() const noexcept { return options_.exact != std::array<bool, 6>{}; }
   void prioritize(const Twist& twist, const JointVector& posture, Solution& solution) noexcept;
+  JointVector mixed(const JointVector& by_priority, const JointVector& together) const noexcept;
   TaskJacobian weighted_rows(const Task& task) const noexcept;
 
   // servo_arrival.cpp
@@ -265,7 +267,7 @@ class Servo {
   void expect_motion() noexcept;
   void count_reversals(const JointVector& qdot) noexcept;
   void slow_down(ServoStep& step) noexcept;
-  bool slow_down_by_rows(ServoStep& step) noexcept;
+  bool slow_down_by_rows(const JointVector& asked, bool by_priority, JointVector& qdot, ServoStep& step) noexcept;
 
   // servo_limits.cpp
   void limit(ServoStep& step) noexcept;
@@ -276,6 +278,8 @@ class Servo {
 
   // servo_redistribution.cpp
   JointVector redistribute(const JointVector& qdot, const VelocityBounds& bounds, ServoStep& step) noexcept;
+  JointVector redistribute_together(const JointVector& qdot, const VelocityBounds& bounds, ServoStep& step) noexcept;
+  JointVector redistribute_by_priority(const JointVector& qdot, const VelocityBounds& bounds, ServoStep& step) noexcept;
   JointVector nearest(const JointVector& begin, const TaskJacobian& rows, const TaskVector& goal, double largest,
                       const JointVector& asked, const VelocityBounds& bounds, ServoStep& step) noexcept;
 
@@ -290,6 +294,7 @@ class Servo {
   TaskJacobian rows_;
   Spectrum exact_spectrum_, rest_spectrum_;
   Resolution exact_resolution_, rest_resolution_;
+  double lost_ = 0.0;  // how far the exact rows cannot be done, in [0, 1]
   ChainState state_;
   JointVector nominal_, qdot_start_, following_error_;
   JointVector expected_error_;  // the following error of a resting arm that nobody has moved since
