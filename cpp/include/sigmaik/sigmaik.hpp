@@ -35,6 +35,7 @@
 ///
 /// To include by name:
 ///
+///     loop_state.hpp                LoopState: the states of a loop, and what leads from one to the next; LoopFault
 ///     servo_loop.hpp                ServoLoop: a servo in a thread of its own; stale commands stop the arm
 ///     kdl.hpp                       from_kdl, to_kdl: from and to KDL::Chain; the one header that includes KDL
 ///     planning/distance_field.hpp   DistanceField: signed distances to obstacles on a grid
