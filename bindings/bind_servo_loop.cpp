@@ -17,6 +17,13 @@ struct Fields<ServoLoopOptions> {
   static constexpr std::tuple all{
       field("history", &ServoLoopOptions::history, "samples kept for read(), a power of 2."),
       field("priority", &ServoLoopOptions::priority, "of SCHED_FIFO, 1 to 99; 0 is the ordinary scheduler."),
+      field("max_missed", &ServoLoopOptions::max_missed,
+            "cycles left out in one go, beyond which the arm stops with a fault; None: the cycles of one second."),
+      field("max_following_error", &ServoLoopOptions::max_following_error,
+            "(n,) [rad or m]: a joint measured farther than this from its command stops the arm with a fault; None: no "
+            "check."),
+      field("measure_timeout", &ServoLoopOptions::measure_timeout,
+            "[s]: this time without measure(), from start() on, stops the arm with a fault; None: no check."),
   };
 };
 
@@ -62,6 +69,7 @@ py::dtype sample_dtype(int dof) {
   add("time", "<f8");
   add("command", "i1");
   add("configuration", "<i4");
+  add("state", "i1");
   add("restarted", "?");
   add("status", "i1");
   add_array("q", py::make_tuple(dof));
@@ -87,6 +95,7 @@ void write(const LoopSample& s, int dof, char* at) {
   record.put(s.time);
   record.put(static_cast<std::int8_t>(s.command));
   record.put(static_cast<std::int32_t>(s.configuration));
+  record.put(static_cast<std::int8_t>(s.state));
   record.put(s.restarted);
   record.put(static_cast<std::int8_t>(s.step.status));
   record.put_all(s.step.q);
@@ -126,9 +135,62 @@ py::array read(ServoLoop& loop) {
 }
 
 // Python's other threads run on while the arm comes to rest.
-void stop(ServoLoop& loop) {
+bool stop(ServoLoop& loop, std::optional<double> timeout) {
   const py::gil_scoped_release release;
-  loop.stop();
+  return timeout ? loop.stop(*timeout) : loop.stop();
+}
+
+// None: nobody's.
+LoopToken token_of(const LoopToken* token) { return token == nullptr ? LoopToken{} : *token; }
+
+void bind_state(py::module_& m) {
+  py::native_enum<LoopState>(m, "LoopState", "enum.IntEnum",
+                             "What a ServoLoop does.\n\n"
+                             "DISABLED: no thread runs. HOLDING: no command, or a stale one. FOLLOWING: a command.\n"
+                             "STOPPING: stop(), halt() or a fault brings the arm to rest. STOPPED: at rest after "
+                             "halt(), until release().\n"
+                             "FAULTED: at rest after a fault, until acknowledge().")
+      .value("DISABLED", LoopState::Disabled)
+      .value("HOLDING", LoopState::Holding)
+      .value("FOLLOWING", LoopState::Following)
+      .value("STOPPING", LoopState::Stopping)
+      .value("STOPPED", LoopState::Stopped)
+      .value("FAULTED", LoopState::Faulted)
+      .finalize();
+}
+
+void bind_fault(py::module_& m) {
+  py::native_enum<LoopFaultKind>(m, "LoopFaultKind", "enum.IntEnum",
+                                 "Why a ServoLoop stopped the arm by itself.\n\n"
+                                 "SINK: the function that sends the commands threw. LATE: more than max_missed cycles "
+                                 "were left out in one go.\n"
+                                 "FOLLOWING_ERROR: a joint was measured too far from its command. UNMEASURED: no "
+                                 "measure() came in time.")
+      .value("SINK", LoopFaultKind::Sink)
+      .value("LATE", LoopFaultKind::Late)
+      .value("FOLLOWING_ERROR", LoopFaultKind::FollowingError)
+      .value("UNMEASURED", LoopFaultKind::Unmeasured)
+      .finalize();
+  py::class_<LoopFault>(m, "LoopFault", "The first fault of a ServoLoop since the last acknowledge().")
+      .def_readonly("kind", &LoopFault::kind)
+      .def_readonly("text", &LoopFault::text, "The cause with its figures.")
+      .def_readonly("time", &LoopFault::time, "[s] since start().")
+      .def_readonly("joint", &LoopFault::joint, "of a following error; else −1.")
+      .def("__repr__", [](const LoopFault& f) {
+        return record("LoopFault", {{"kind", py::str(to_string(f.kind))},
+                                    {"text", py::cast(f.text)},
+                                    {"time", py::cast(f.time)},
+                                    {"joint", py::cast(f.joint)}});
+      });
+  py::class_<LoopToken>(m, "LoopToken", "Names the owner of an arm to its ServoLoop: see ServoLoop.take.")
+      .def(
+          "__eq__", [](const LoopToken& a, const LoopToken& b) { return a == b; }, py::is_operator())
+      .def("__hash__", [](const LoopToken& t) { return t.number; })
+      .def("__repr__", [](const LoopToken& t) { return record("LoopToken", {{"number", py::cast(t.number)}}); });
+}
+
+bool measure(ServoLoop& loop, const ArrayLike& q, const MaybeArray& qdot) {
+  return loop.measure(joint_argument(q, "q", loop.dof()), optional_joint_argument(object_of(qdot), "qdot", loop.dof()));
 }
 
 void bind_command(py::module_& m) {
@@ -145,6 +207,7 @@ void bind_statistics(py::module_& m) {
       .def_readonly("cycles", &LoopStatistics::cycles)
       .def_readonly("missed", &LoopStatistics::missed, "Cycles left out, as their time had passed.")
       .def_readonly("unread", &LoopStatistics::unread, "Samples lost, as nobody read them in time.")
+      .def_readonly("sink_errors", &LoopStatistics::sink_errors, "Exceptions of the sink.")
       .def_readonly("worst_delay", &LoopStatistics::worst_delay, "[s] from when a cycle was due to its start.")
       .def_readonly("elapsed", &LoopStatistics::elapsed, "[s] since start(), or from start() to stop().")
       .def_property_readonly("rate", &LoopStatistics::rate, "[Hz] cycles a second.")
@@ -163,39 +226,85 @@ void bind_thread(py::class_<ServoLoop>& c) {
                                return std::make_unique<ServoLoop>(servo, ServoLoop::Sink{}, options);
                              });
   c.def("start", &ServoLoop::start,
-        "Starts the thread. Raises Error where it runs already, or the system refuses the priority.")
-      .def("stop", &stop, "Brings the arm to rest, in a second at most, and ends the thread.")
-      .def_property_readonly("running", &ServoLoop::running);
+        "Starts the thread. The arm rests until a command comes: commands from before are forgotten.\n\n"
+        "Raises Error where the loop runs already, a fault is not acknowledged, or the system refuses the priority.")
+      .def("stop", &stop, py::arg("timeout") = py::none(),
+           "Brings the arm to rest by the fastest stop that its limits allow, and then ends the thread.\n\n"
+           "Waits for `timeout` [s], 0 to 60, at most; None: `stop_time`. Returns whether the arm rests and no thread "
+           "runs; where it\n"
+           "does not, the thread goes on stopping the arm, and ends by itself.")
+      .def_property_readonly("stop_time", &ServoLoop::stop_time,
+                             "[s] for which stop() waits at most, from the arm's limits.")
+      .def_property_readonly("running", &ServoLoop::running, "Whether the thread runs, in this process.")
+      .def_property_readonly("state", &ServoLoop::state,
+                             "The LoopState that the last cycle and the calls since have left.");
+}
+
+void bind_safety(py::class_<ServoLoop>& c) {
+  c.def("halt", &ServoLoop::halt,
+        "Stops the arm as fast as its limits allow, and latches: the arm rests until release(), whoever commands.")
+      .def(
+          "release", [](ServoLoop& loop, const LoopToken* token) { loop.release(token_of(token)); },
+          py::arg("token") = py::none(),
+          "Opens the latch of halt(), or of a fault that is acknowledged. The arm rests until a new command comes.\n\n"
+          "Raises Error where the arm does not rest yet, a fault is not acknowledged, or somebody else owns the arm.")
+      .def_property_readonly("fault", &ServoLoop::fault,
+                             "The fault that stopped the arm, until acknowledge(); or None.")
+      .def("acknowledge", &ServoLoop::acknowledge,
+           "Forgets the fault. The arm stays halted, until release(). Raises Error where the arm does not rest yet.")
+      .def("measure", &measure, py::arg("q"), py::arg("qdot") = py::none(),
+           "Tells the loop where the arm is: q and qdot (n,), as often as they are measured, from one thread.\n\n"
+           "The next cycle compares q with the command (max_following_error), and gives both to Servo.measure.\n"
+           "Returns False where the loop does not run, or another thread is just measuring.");
+}
+
+void bind_owner(py::class_<ServoLoop>& c) {
+  c.def("take", &ServoLoop::take, py::arg("name"), py::arg("take_over") = false,
+        "Makes the caller the arm's owner; a live command is forgotten.\n\n"
+        "Until give_back(), follow(), follow_twist(), configure() and release() need the token that is returned; "
+        "anyone may\n"
+        "stop(), halt() and hold() the arm. Raises Error where the arm has an owner, unless it is taken over.")
+      .def("give_back", &ServoLoop::give_back, py::arg("token"),
+           "Gives the arm back, and stops it. Returns False where the token is not the owner's, and changes nothing.")
+      .def_property_readonly("owner", &ServoLoop::owner, "The owner's name; '' where nobody owns the arm.");
 }
 
 void bind_targets(py::class_<ServoLoop>& c) {
   c.def(
        "follow",
-       [](ServoLoop& loop, const py::object& target, double timeout) {
-         loop.follow(pose_argument(target, "target"), timeout);
+       [](ServoLoop& loop, const py::object& target, double timeout, const LoopToken* token) {
+         loop.follow(pose_argument(target, "target"), timeout, token_of(token));
        },
-       py::arg("target"), py::arg("timeout"),
-       "Follows a pose (4, 4) of the tip in the base, for `timeout` [s] unless it is said again.")
+       py::arg("target"), py::arg("timeout"), py::arg("token") = py::none(),
+       "Follows a pose (4, 4) of the tip in the base, for `timeout` [s] (up to 60) unless it is said again.\n\n"
+       "Raises Error where the loop does not run, is halted, stopping or faulted, or somebody else owns the arm.")
       .def(
           "follow_twist",
-          [](ServoLoop& loop, const ArrayLike& twist, double timeout) {
-            loop.follow_twist(twist_argument(twist, "twist"), timeout);
+          [](ServoLoop& loop, const ArrayLike& twist, double timeout, const LoopToken* token) {
+            loop.follow_twist(twist_argument(twist, "twist"), timeout, token_of(token));
           },
-          py::arg("twist"), py::arg("timeout"),
-          "Follows a twist (6,) [v; ω], base axes, at the tip's origin, for `timeout` [s] unless it is said again.")
-      .def("hold", &ServoLoop::hold, "Stops as fast as limits allow, and rests.")
-      .def("configure", &ServoLoop::configure, py::arg("servo"), py::arg("restart") = false,
-           "Goes on with another servo (a copy) of the same arm and dt: other rule, other options.\n\n"
-           "The new servo takes over the motion. With `restart` it starts where it was reset to, in simulation only:\n"
-           "a real arm would jump.\n"
-           "Returns a number, one more each time, by which samples tell it; 0 is the first servo's.");
+          py::arg("twist"), py::arg("timeout"), py::arg("token") = py::none(),
+          "Follows a twist (6,) [v; ω], base axes, at the tip's origin, for `timeout` [s] (up to 60) unless it is said "
+          "again.\n\n"
+          "Raises Error as follow() does.")
+      .def("hold", &ServoLoop::hold, "Stops as fast as limits allow, and rests until the next command.")
+      .def(
+          "configure",
+          [](ServoLoop& loop, const Servo& servo, bool restart, const LoopToken* token) {
+            return loop.configure(servo, restart, token_of(token));
+          },
+          py::arg("servo"), py::arg("restart") = false, py::arg("token") = py::none(),
+          "Goes on with another servo (a copy) of the same arm and dt: other rule, other options.\n\n"
+          "The new servo takes over the motion. With `restart` it starts where it was reset to: in simulation, or\n"
+          "where the arm rests there already. Any other arm jumps.\n"
+          "Returns a number, one more each time, by which samples tell it; 0 is the first servo's.");
 }
 
 void bind_records(py::class_<ServoLoop>& c) {
   c.def("read", &read,
         "(N,) structured array: what was done in each cycle since the last call.\n\n"
-        "cycle, time [s] since start(), command (LoopCommand), configuration, restarted, status (Status), q and "
-        "qdot (n,), target and\n"
+        "cycle, time [s] since start(), command (LoopCommand), configuration, state (LoopState), restarted, status "
+        "(Status), q and qdot (n,), target and\n"
         "pose (4, 4) of the tip, pose_error, asked_twist and achieved_twist (6,), singular_values (NaN while "
         "holding),\n"
         "singular (bits), singular_directions (6, 6) (ServoStep's columns, NaN beyond them), limiting_joints "
@@ -206,7 +315,7 @@ void bind_records(py::class_<ServoLoop>& c) {
       .def("__repr__", [](const ServoLoop& loop) {
         return record(
             "ServoLoop",
-            {{"dof", py::cast(loop.dof())}, {"dt", py::cast(loop.dt())}, {"running", py::cast(loop.running())}});
+            {{"dof", py::cast(loop.dof())}, {"dt", py::cast(loop.dt())}, {"state", py::str(to_string(loop.state()))}});
       });
 }
 
@@ -217,7 +326,11 @@ void bind_context(py::class_<ServoLoop>& c) {
           return self;
         })
       .def(
-          "__exit__", [](ServoLoop& loop, const py::object&, const py::object&, const py::object&) { stop(loop); },
+          "__exit__",
+          [](ServoLoop& loop, const py::object& type, const py::object&, const py::object&) {
+            if (stop(loop, {}) || !type.is_none() || !loop.running()) return;
+            throw Error("the arm does not rest yet: the loop goes on stopping it");
+          },
           py::arg("type"), py::arg("value"), py::arg("traceback"));
 }
 
@@ -225,13 +338,21 @@ void bind_context(py::class_<ServoLoop>& c) {
 
 void bind_servo_loop(py::module_& m) {
   bind_command(m);
+  bind_state(m);
+  bind_fault(m);
   bind_statistics(m);
   py::class_<ServoLoop> c(
       m, "ServoLoop",
       "A servo in a thread of its own, at its own rate, whatever Python does meanwhile.\n\n"
       "Commands hold until they are stale: an arm whose commander hangs, or is gone, stops by itself, within its\n"
-      "limits. Late cycles are counted and left out, never made up for by a burst.");
+      "limits. Late cycles are counted and left out, never made up for by a burst; where too many are late, the arm "
+      "stops.\n\n"
+      "No motion without a new command: start(), release(), take() and give_back() forget the earlier ones. After\n"
+      "os.fork() no loop runs in the child.",
+      py::release_gil_before_calling_cpp_dtor());
   bind_thread(c);
+  bind_safety(c);
+  bind_owner(c);
   bind_targets(c);
   bind_records(c);
   bind_context(c);
