@@ -118,8 +118,8 @@ TEST_CASE("after stop() and start() nothing moves without a new command") {
 }
 
 TEST_CASE("stop() returns true when the arm rests, and false where the arm needs longer: the thread goes on stopping") {
-  for (const double acceleration : {5.0, 8.0}) {
-    ServoLoop loop(started(acceleration, moving(1.0)));  // 0.2 s, 0.125 s to rest
+  for (const double acceleration : {8.0, 12.0}) {
+    ServoLoop loop(started(acceleration, moving(1.0)));  // 0.125 s, 0.083 s to rest
     loop.start();
     CHECK_FALSE(loop.stop(0.01));
     CHECK(loop.running());

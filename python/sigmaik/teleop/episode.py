@@ -3,7 +3,8 @@
 A recording as an npz file (numpy.load reads the file, without pickles) has an array of N rows for each field of
 `ServoLoop.read`:
 
-    cycle, time [s], command (0 hold, 1 pose, 2 twist, 3 stale), configuration, restarted, status (sigmaik.Status),
+    cycle, time [s], command (0 hold, 1 pose, 2 twist, 3 stale), configuration, state (sigmaik.LoopState; -1
+    in recordings of before), restarted, status (sigmaik.Status),
     q (N, n), qdot (N, n), target (N, 4, 4), pose (N, 4, 4), pose_error (N, 6), asked_twist (N, 6),
     achieved_twist (N, 6), singular_values (N, min(6, n)), singular (bits), singular_directions (N, 6, 6),
     limiting_joints (bits), scale, guide (sigmaik.GuideState), guide_joints (bits)
@@ -49,6 +50,7 @@ _LIMITS = ("lower", "upper", "velocity", "acceleration")
 #: Fields that older recordings do not have, with type, shape of a row, and value there.
 _LATER: dict[str, tuple[str, tuple[int, ...], float]] = {
     "singular_directions": ("<f8", (6, 6), math.nan),
+    "state": ("i1", (), -1),
     "guide": ("i1", (), int(sk.GuideState.OFF)),
     "guide_joints": ("<u2", (), 0),
 }

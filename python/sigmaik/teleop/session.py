@@ -85,6 +85,8 @@ class Session:
         return self
 
     def __exit__(self, *_: object) -> None:
+        with self._lock:
+            self._goal = None  # a session that is entered again does not move before a new command
         self._loop.stop()
 
     # --- commands
