@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstring>
 #include <limits>
+#include <optional>
 
 #include <sigmaik/servo_loop.hpp>
 
@@ -141,7 +142,7 @@ bool stop(ServoLoop& loop, std::optional<double> timeout) {
 }
 
 // None: nobody's.
-LoopToken token_of(const LoopToken* token) { return token == nullptr ? LoopToken{} : *token; }
+LoopToken token_of(const std::optional<LoopToken>& token) { return token.value_or(LoopToken{}); }
 
 void bind_state(py::module_& m) {
   py::native_enum<LoopState>(m, "LoopState", "enum.IntEnum",
@@ -183,8 +184,8 @@ void bind_fault(py::module_& m) {
                                     {"joint", py::cast(f.joint)}});
       });
   py::class_<LoopToken>(m, "LoopToken", "Names the owner of an arm to its ServoLoop: see ServoLoop.take.")
-      .def(
-          "__eq__", [](const LoopToken& a, const LoopToken& b) { return a == b; }, py::is_operator())
+      .def("__eq__", [](const LoopToken& a,
+                        const py::object& b) { return py::isinstance<LoopToken>(b) && a == b.cast<LoopToken>(); })
       .def("__hash__", [](const LoopToken& t) { return t.number; })
       .def("__repr__", [](const LoopToken& t) { return record("LoopToken", {{"number", py::cast(t.number)}}); });
 }
@@ -244,7 +245,7 @@ void bind_safety(py::class_<ServoLoop>& c) {
   c.def("halt", &ServoLoop::halt,
         "Stops the arm as fast as its limits allow, and latches: the arm rests until release(), whoever commands.")
       .def(
-          "release", [](ServoLoop& loop, const LoopToken* token) { loop.release(token_of(token)); },
+          "release", [](ServoLoop& loop, const std::optional<LoopToken>& token) { loop.release(token_of(token)); },
           py::arg("token") = py::none(),
           "Opens the latch of halt(), or of a fault that is acknowledged. The arm rests until a new command comes.\n\n"
           "Raises Error where the arm does not rest yet, a fault is not acknowledged, or somebody else owns the arm.")
@@ -272,7 +273,7 @@ void bind_owner(py::class_<ServoLoop>& c) {
 void bind_targets(py::class_<ServoLoop>& c) {
   c.def(
        "follow",
-       [](ServoLoop& loop, const py::object& target, double timeout, const LoopToken* token) {
+       [](ServoLoop& loop, const py::object& target, double timeout, const std::optional<LoopToken>& token) {
          loop.follow(pose_argument(target, "target"), timeout, token_of(token));
        },
        py::arg("target"), py::arg("timeout"), py::arg("token") = py::none(),
@@ -280,7 +281,7 @@ void bind_targets(py::class_<ServoLoop>& c) {
        "Raises Error where the loop does not run, is halted, stopping or faulted, or somebody else owns the arm.")
       .def(
           "follow_twist",
-          [](ServoLoop& loop, const ArrayLike& twist, double timeout, const LoopToken* token) {
+          [](ServoLoop& loop, const ArrayLike& twist, double timeout, const std::optional<LoopToken>& token) {
             loop.follow_twist(twist_argument(twist, "twist"), timeout, token_of(token));
           },
           py::arg("twist"), py::arg("timeout"), py::arg("token") = py::none(),
@@ -290,7 +291,7 @@ void bind_targets(py::class_<ServoLoop>& c) {
       .def("hold", &ServoLoop::hold, "Stops as fast as limits allow, and rests until the next command.")
       .def(
           "configure",
-          [](ServoLoop& loop, const Servo& servo, bool restart, const LoopToken* token) {
+          [](ServoLoop& loop, const Servo& servo, bool restart, const std::optional<LoopToken>& token) {
             return loop.configure(servo, restart, token_of(token));
           },
           py::arg("servo"), py::arg("restart") = false, py::arg("token") = py::none(),

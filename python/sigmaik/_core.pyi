@@ -10,7 +10,7 @@ import os
 import pathlib
 import sigmaik.planning.status
 import typing
-__all__: list[str] = ['AdaptiveDampedLeastSquares', 'AnalyticBranch', 'AnalyticIk', 'ArgumentError', 'ArmSpheres', 'CartError', 'CartMeasures', 'CartMotion', 'CartRegion', 'Chain', 'Clearance', 'ComputedTorque', 'ComputedTorqueStep', 'ConstrainedIk', 'ConstrainedIkStep', 'Crossing', 'DEFAULT_SCALE', 'DampedLeastSquares', 'DistanceField', 'Dynamics', 'Error', 'GuideState', 'Inertia', 'JParse', 'JacobianProjection', 'JacobianSafety', 'JacobianSafetyProjection', 'JointCost', 'JointLimits', 'LeastSquaresSolution', 'LoopCommand', 'LoopStatistics', 'Method', 'ModelWarning', 'PlaneCartMotion', 'Playback', 'PositionIk', 'PositionIkBranch', 'PositionIkResult', 'PositionIkStatus', 'PseudoInverse', 'SampleCounts', 'SampleStatus', 'Segment', 'SelectivelyDampedLeastSquares', 'Servo', 'ServoLoop', 'ServoStep', 'SingularSets', 'Solution', 'Spectrum', 'Status', 'StreamStatus', 'Target', 'TargetStream', 'TimeOptimal', 'TimeOptimalResult', 'Trajectory', 'VelocitySolver', 'admissible_guess', 'cart_descent', 'cart_motion', 'cart_motion_by_descent', 'clearance', 'collision_cost', 'draw_from_prior', 'evaluate_cart_motion', 'evaluate_cart_motion_plane', 'evaluate_index', 'forbidden_intervals', 'geometry_aware_cost', 'index_of_jacobian', 'joint_limit_cost', 'known_singular_sets', 'least_squares', 'load_singular_sets', 'log_manipulability_cost', 'manipulability_cost', 'min_distance', 'plan_gradient', 'plan_stochastic', 'plane_cart_motion', 'planner_options', 'play', 'pose_error', 'potential_cost', 'reference_scale', 'rotation_exp', 'rotation_log', 'rules', 'scaled_cost', 'self_collision_cost', 'self_collision_pairs', 'singular_sets_of', 'solve_batch', 'spline_velocities', 'sum_of_costs', 'taut_string']
+__all__: list[str] = ['AdaptiveDampedLeastSquares', 'AnalyticBranch', 'AnalyticIk', 'ArgumentError', 'ArmSpheres', 'CartError', 'CartMeasures', 'CartMotion', 'CartRegion', 'Chain', 'Clearance', 'ComputedTorque', 'ComputedTorqueStep', 'ConstrainedIk', 'ConstrainedIkStep', 'Crossing', 'DEFAULT_SCALE', 'DampedLeastSquares', 'DistanceField', 'Dynamics', 'Error', 'GuideState', 'Inertia', 'JParse', 'JacobianProjection', 'JacobianSafety', 'JacobianSafetyProjection', 'JointCost', 'JointLimits', 'LeastSquaresSolution', 'LoopCommand', 'LoopFault', 'LoopFaultKind', 'LoopState', 'LoopStatistics', 'LoopToken', 'Method', 'ModelWarning', 'PlaneCartMotion', 'Playback', 'PositionIk', 'PositionIkBranch', 'PositionIkResult', 'PositionIkStatus', 'PseudoInverse', 'SampleCounts', 'SampleStatus', 'Segment', 'SelectivelyDampedLeastSquares', 'Servo', 'ServoLoop', 'ServoStep', 'SingularSets', 'Solution', 'Spectrum', 'Status', 'StreamStatus', 'Target', 'TargetStream', 'TimeOptimal', 'TimeOptimalResult', 'Trajectory', 'VelocitySolver', 'admissible_guess', 'cart_descent', 'cart_motion', 'cart_motion_by_descent', 'clearance', 'collision_cost', 'draw_from_prior', 'evaluate_cart_motion', 'evaluate_cart_motion_plane', 'evaluate_index', 'forbidden_intervals', 'geometry_aware_cost', 'index_of_jacobian', 'joint_limit_cost', 'known_singular_sets', 'least_squares', 'load_singular_sets', 'log_manipulability_cost', 'manipulability_cost', 'min_distance', 'plan_gradient', 'plan_stochastic', 'plane_cart_motion', 'planner_options', 'play', 'pose_error', 'potential_cost', 'reference_scale', 'rotation_exp', 'rotation_log', 'rules', 'scaled_cost', 'self_collision_cost', 'self_collision_pairs', 'singular_sets_of', 'solve_batch', 'spline_velocities', 'sum_of_costs', 'taut_string']
 DEFAULT_SCALE: float = 6.0
 __version__: str
 
@@ -892,6 +892,65 @@ class LoopCommand(enum.IntEnum):
     POSE = ...
     STALE = ...
     TWIST = ...
+class LoopState(enum.IntEnum):
+    """
+    What a ServoLoop does.
+
+    DISABLED: no thread runs. HOLDING: no command, or a stale one. FOLLOWING: a command.
+    STOPPING: stop(), halt() or a fault brings the arm to rest. STOPPED: at rest after halt(), until release().
+    FAULTED: at rest after a fault, until acknowledge().
+    """
+    DISABLED = ...
+    FAULTED = ...
+    FOLLOWING = ...
+    HOLDING = ...
+    STOPPED = ...
+    STOPPING = ...
+class LoopFaultKind(enum.IntEnum):
+    """
+    Why a ServoLoop stopped the arm by itself.
+
+    SINK: the function that sends the commands threw. LATE: more than max_missed cycles were left out in one go.
+    FOLLOWING_ERROR: a joint was measured too far from its command. UNMEASURED: no measure() came in time.
+    """
+    FOLLOWING_ERROR = ...
+    LATE = ...
+    SINK = ...
+    UNMEASURED = ...
+class LoopFault:
+    """
+    The first fault of a ServoLoop since the last acknowledge().
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def joint(self) -> int:
+        """
+        of a following error; else −1.
+        """
+    @property
+    def kind(self) -> LoopFaultKind:
+        ...
+    @property
+    def text(self) -> str:
+        """
+        The cause with its figures.
+        """
+    @property
+    def time(self) -> float:
+        """
+        [s] since start().
+        """
+class LoopToken:
+    """
+    Names the owner of an arm to its ServoLoop: see ServoLoop.take.
+    """
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __repr__(self) -> str:
+        ...
 class LoopStatistics:
     """
     How a ServoLoop keeps its rate.
@@ -917,6 +976,11 @@ class LoopStatistics:
         [Hz] cycles a second.
         """
     @property
+    def sink_errors(self) -> int:
+        """
+        Exceptions of the sink.
+        """
+    @property
     def unread(self) -> int:
         """
         Samples lost, as nobody read them in time.
@@ -931,56 +995,106 @@ class ServoLoop:
     A servo in a thread of its own, at its own rate, whatever Python does meanwhile.
 
     Commands hold until they are stale: an arm whose commander hangs, or is gone, stops by itself, within its
-    limits. Late cycles are counted and left out, never made up for by a burst.
+    limits. Late cycles are counted and left out, never made up for by a burst; where too many are late, the arm stops.
+
+    No motion without a new command: start(), release(), take() and give_back() forget the earlier ones. After
+    os.fork() no loop runs in the child.
     """
     def __enter__(self) -> typing.Any:
         ...
     def __exit__(self, type: typing.Any, value: typing.Any, traceback: typing.Any) -> None:
         ...
-    def __init__(self, servo: Servo, *, history: typing.SupportsInt | typing.SupportsIndex = 4096, priority: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+    def __init__(self, servo: Servo, *, history: typing.SupportsInt | typing.SupportsIndex = 4096, priority: typing.SupportsInt | typing.SupportsIndex = 0, max_missed: typing.SupportsInt | typing.SupportsIndex | None = None, max_following_error: numpy.typing.ArrayLike | None = None, measure_timeout: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
         """
         servo: has started (reset); it is copied.
         history: samples kept for read(), a power of 2.
         priority: of SCHED_FIFO, 1 to 99; 0 is the ordinary scheduler.
+        max_missed: cycles left out in one go, beyond which the arm stops with a fault; None: the cycles of
+            one second.
+        max_following_error: (n,) [rad or m]: a joint measured farther than this from its command stops the
+            arm with a fault; None: no check.
+        measure_timeout: [s]: this time without measure(), from start() on, stops the arm with a fault;
+            None: no check.
         """
     def __repr__(self) -> str:
         ...
-    def configure(self, servo: Servo, restart: bool = False) -> int:
+    def acknowledge(self) -> None:
+        """
+        Forgets the fault. The arm stays halted, until release(). Raises Error where the arm does not rest yet.
+        """
+    def configure(self, servo: Servo, restart: bool = False, token: LoopToken | None = None) -> int:
         """
         Goes on with another servo (a copy) of the same arm and dt: other rule, other options.
 
-        The new servo takes over the motion. With `restart` it starts where it was reset to, in simulation only:
-        a real arm would jump.
+        The new servo takes over the motion. With `restart` it starts where it was reset to: in simulation, or
+        where the arm rests there already. Any other arm jumps.
         Returns a number, one more each time, by which samples tell it; 0 is the first servo's.
         """
-    def follow(self, target: typing.Any, timeout: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def follow(self, target: typing.Any, timeout: typing.SupportsFloat | typing.SupportsIndex, token: LoopToken | None = None) -> None:
         """
-        Follows a pose (4, 4) of the tip in the base, for `timeout` [s] unless it is said again.
+        Follows a pose (4, 4) of the tip in the base, for `timeout` [s] (up to 60) unless it is said again.
+
+        Raises Error where the loop does not run, is halted, stopping or faulted, or somebody else owns the arm.
         """
-    def follow_twist(self, twist: numpy.typing.ArrayLike, timeout: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def follow_twist(self, twist: numpy.typing.ArrayLike, timeout: typing.SupportsFloat | typing.SupportsIndex, token: LoopToken | None = None) -> None:
         """
-        Follows a twist (6,) [v; ω], base axes, at the tip's origin, for `timeout` [s] unless it is said again.
+        Follows a twist (6,) [v; ω], base axes, at the tip's origin, for `timeout` [s] (up to 60) unless it is said again.
+
+        Raises Error as follow() does.
+        """
+    def give_back(self, token: LoopToken) -> bool:
+        """
+        Gives the arm back, and stops it. Returns False where the token is not the owner's, and changes nothing.
+        """
+    def halt(self) -> None:
+        """
+        Stops the arm as fast as its limits allow, and latches: the arm rests until release(), whoever commands.
         """
     def hold(self) -> None:
         """
-        Stops as fast as limits allow, and rests.
+        Stops as fast as limits allow, and rests until the next command.
+        """
+    def measure(self, q: numpy.typing.ArrayLike, qdot: numpy.typing.ArrayLike | None = None) -> bool:
+        """
+        Tells the loop where the arm is: q and qdot (n,), as often as they are measured, from one thread.
+
+        The next cycle compares q with the command (max_following_error), and gives both to Servo.measure.
+        Returns False where the loop does not run, or another thread is just measuring.
         """
     def read(self) -> numpy.ndarray:
         """
         (N,) structured array: what was done in each cycle since the last call.
 
-        cycle, time [s] since start(), command (LoopCommand), configuration, restarted, status (Status), q and qdot (n,), target and
+        cycle, time [s] since start(), command (LoopCommand), configuration, state (LoopState), restarted, status (Status), q and qdot (n,), target and
         pose (4, 4) of the tip, pose_error, asked_twist and achieved_twist (6,), singular_values (NaN while holding),
         singular (bits), singular_directions (6, 6) (ServoStep's columns, NaN beyond them), limiting_joints (bits),
         scale, guide (GuideState), guide_joints (bits).
         """
+    def release(self, token: LoopToken | None = None) -> None:
+        """
+        Opens the latch of halt(), or of a fault that is acknowledged. The arm rests until a new command comes.
+
+        Raises Error where the arm does not rest yet, a fault is not acknowledged, or somebody else owns the arm.
+        """
     def start(self) -> None:
         """
-        Starts the thread. Raises Error where it runs already, or the system refuses the priority.
+        Starts the thread. The arm rests until a command comes: commands from before are forgotten.
+
+        Raises Error where the loop runs already, a fault is not acknowledged, or the system refuses the priority.
         """
-    def stop(self) -> None:
+    def stop(self, timeout: typing.SupportsFloat | typing.SupportsIndex | None = None) -> bool:
         """
-        Brings the arm to rest, in a second at most, and ends the thread.
+        Brings the arm to rest by the fastest stop that its limits allow, and then ends the thread.
+
+        Waits for `timeout` [s], 0 to 60, at most; None: `stop_time`. Returns whether the arm rests and no thread runs; where it
+        does not, the thread goes on stopping the arm, and ends by itself.
+        """
+    def take(self, name: str, take_over: bool = False) -> LoopToken:
+        """
+        Makes the caller the arm's owner; a live command is forgotten.
+
+        Until give_back(), follow(), follow_twist(), configure() and release() need the token that is returned; anyone may
+        stop(), halt() and hold() the arm. Raises Error where the arm has an owner, unless it is taken over.
         """
     @property
     def dt(self) -> float:
@@ -988,11 +1102,33 @@ class ServoLoop:
         [s]
         """
     @property
+    def fault(self) -> LoopFault | None:
+        """
+        The fault that stopped the arm, until acknowledge(); or None.
+        """
+    @property
+    def owner(self) -> str:
+        """
+        The owner's name; '' where nobody owns the arm.
+        """
+    @property
     def running(self) -> bool:
-        ...
+        """
+        Whether the thread runs, in this process.
+        """
+    @property
+    def state(self) -> LoopState:
+        """
+        The LoopState that the last cycle and the calls since have left.
+        """
     @property
     def statistics(self) -> LoopStatistics:
         ...
+    @property
+    def stop_time(self) -> float:
+        """
+        [s] for which stop() waits at most, from the arm's limits.
+        """
 
 # ---- Target stream ----------------------------------------------------------------------------------------------------
 class StreamStatus(enum.IntEnum):
