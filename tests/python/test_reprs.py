@@ -2,6 +2,7 @@
 
 import enum
 import inspect
+import time
 
 import numpy as np
 import pytest
@@ -27,7 +28,10 @@ def shown() -> list[object]:
     spectrum = sk.Spectrum()
     spectrum.decompose(arm.jacobian(q))
     torque = sk.ComputedTorque(arm)
-    loop = sk.ServoLoop(servo)
+    loop = sk.ServoLoop(servo, measure_timeout=1e-6)  # a fault in the first cycle
+    with loop:
+        while loop.fault is None:
+            time.sleep(1e-3)
     puma = sk.AnalyticIk(sk.robots.load("puma560"))
     position = sk.PositionIk(arm)
     plan = sk.planning.time_optimal(arm, q, q + 0.1)
@@ -50,6 +54,8 @@ def shown() -> list[object]:
         torque,
         torque.update(q, 0 * q, q, 0 * q, 0 * q),
         loop,
+        loop.fault,
+        loop.take("test"),
         loop.statistics,
         puma,
         puma.branches(sk.robots.load("puma560").pose(sk.robots.home("puma560")))[0],
