@@ -7,6 +7,8 @@
 #include <stdexcept>
 #include <string>
 
+#include <sigmaik/servo_loop.hpp>
+
 #include "heap.hpp"
 #include "loop_rig.hpp"
 

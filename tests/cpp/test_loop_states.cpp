@@ -76,6 +76,9 @@ TEST_CASE("the table of calls: commands") {
 TEST_CASE("the table of calls: owner, servo, measurement") {
   using enum LoopState;
   check({"take", [](ServoLoop& l) { l.take("me"); }, {Disabled, Holding, Holding, Stopping, Stopped, Faulted}});
+  check({"give_back",
+         [](ServoLoop& l) { CHECK(l.give_back(l.take("me"))); },
+         {Disabled, Holding, Holding, Stopping, Stopped, Faulted}});
   check({"configure",
          [](ServoLoop& l) { l.configure(started()); },
          {Disabled, Holding, Following, Stopping, Stopped, Faulted}});
