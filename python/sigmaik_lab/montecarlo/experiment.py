@@ -13,21 +13,20 @@ orders of magnitude smaller; and it counts the crossings of singular sets that n
 from __future__ import annotations
 
 import concurrent.futures
-import csv
-import io
-import json
+import itertools
 import math
-import os
 import pathlib
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass, fields
-from typing import Any, Literal, cast
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from typing import Literal, cast
 
 import numpy as np
 
 import sigmaik as sk
 from sigmaik._types import Array
 from sigmaik.planning import Trajectory, time_optimal
+from sigmaik_lab import row_file
+from sigmaik_lab.work import compute
 
 __all__ = [
     "OBJECTIVES",
@@ -171,7 +170,8 @@ def solve_sample(study: MonteCarlo, sample: int) -> list[Row]:
 _chains: dict[tuple[str, str | None, str | None], sk.Chain] = {}
 
 
-def _solve_chunk(study: MonteCarlo, samples: Sequence[int]) -> list[list[Row]]:
+def _solve_chunk(task: tuple[MonteCarlo, Sequence[int]]) -> list[list[Row]]:
+    study, samples = task
     return [solve_sample(study, sample) for sample in samples]
 
 
@@ -249,113 +249,38 @@ def run_study(
     advance: called with the number of samples done, first with the number of samples in the file.
     """
     file = pathlib.Path(file)
-    rows = _resume(study, file)
+    facts = {name: value for name, value in asdict(study).items() if name not in ("base", "tip") or value is not None}
+    facts["version"] = sk.__version__
+    rows = row_file.resume_rows(file, facts, Row, lambda found: _whole(study, found), may_differ=["samples"])
     done = {row.sample for row in rows}
     advance(len(done))
     missing = [s for s in range(study.samples) if s not in done]
-    with open(file, "a", encoding="utf-8", newline="") as stream:
-        for sample_rows in _compute(study, missing, executor, jobs):
-            stream.write("".join(_line(row) for row in sample_rows))
-            stream.flush()
-            rows += sample_rows
-            advance(1)
+    chunk = 1 if executor is None else CHUNK
+    tasks = ((study, missing[i : i + chunk]) for i in range(0, len(missing), chunk))
+    for sample_rows in itertools.chain.from_iterable(compute(_solve_chunk, tasks, executor, jobs)):
+        row_file.append_rows(file, sample_rows)
+        rows += sample_rows
+        advance(1)
     order = {objective: i for i, objective in enumerate(study.objectives)}
     return sorted(rows, key=lambda row: (row.sample, order[cast(Objective, row.objective)]))
 
 
-def _compute(
-    study: MonteCarlo, missing: Sequence[int], executor: concurrent.futures.Executor | None, jobs: int
-) -> Iterator[list[Row]]:
-    if executor is None:
-        for sample in missing:
-            yield solve_sample(study, sample)
-        return
-    chunks = iter([missing[i : i + CHUNK] for i in range(0, len(missing), CHUNK)])
-    waiting: set[concurrent.futures.Future[list[list[Row]]]] = set()
-
-    def submit() -> bool:
-        chunk = next(chunks, None)
-        if chunk is not None:
-            waiting.add(executor.submit(_solve_chunk, study, chunk))
-        return chunk is not None
-
-    try:
-        while len(waiting) < 2 * jobs and submit():
-            pass
-        while waiting:
-            finished = next(concurrent.futures.as_completed(waiting))
-            waiting.remove(finished)
-            submit()
-            yield from finished.result()
-    finally:
-        for future in waiting:
-            future.cancel()
-
-
-COLUMNS = [field.name for field in fields(Row)]
-
-
-def _header(study: MonteCarlo) -> str:
-    facts = {name: value for name, value in asdict(study).items() if name not in ("base", "tip") or value is not None}
-    return "# " + json.dumps({**facts, "version": sk.__version__}) + "\n" + ",".join(COLUMNS) + "\n"
-
-
-def _line(row: Row) -> str:
-    text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerow([getattr(row, name) for name in COLUMNS])
-    return text.getvalue()
-
-
-def _resume(study: MonteCarlo, file: pathlib.Path) -> list[Row]:
-    """Rows of complete samples. The file is begun, or cut to these rows."""
-    header = _header(study)
-    if not file.exists() or file.stat().st_size == 0:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_text(header, encoding="utf-8")
-        return []
-    known, rows = read_rows(file)
-    if {**known, "samples": 0} != {**json.loads(header.splitlines()[0][2:]), "samples": 0}:
-        raise ValueError(f"{file} is of another study: {json.dumps(known)}")
+def _whole(study: MonteCarlo, rows: Sequence[Row]) -> list[Row]:
+    """Rows of complete samples."""
     complete: dict[int, dict[str, Row]] = {}
     for row in rows:
         complete.setdefault(row.sample, {}).setdefault(row.objective, row)
-    whole = [
+    return [
         row
         for sample, found in complete.items()
         if sample < study.samples and set(found) == set(study.objectives)
         for row in found.values()
     ]
-    text = header + "".join(_line(row) for row in whole)
-    if text != file.read_text(encoding="utf-8"):
-        beside = file.with_name(file.name + ".part")
-        beside.write_text(text, encoding="utf-8")
-        os.replace(beside, file)
-    return whole
 
 
 def read_rows(file: str | pathlib.Path) -> tuple[dict[str, object], list[Row]]:
     """The study of a file, and its rows; a line that was cut off is left out."""
-    text = pathlib.Path(file).read_text(encoding="utf-8")
-    lines = text.splitlines()
-    try:
-        study = json.loads(lines[0].removeprefix("# "))
-        if not lines[0].startswith("# ") or lines[1] != ",".join(COLUMNS):
-            raise ValueError
-    except (IndexError, ValueError) as error:
-        raise ValueError(f"{file} is not the file of a study") from error
-    if not text.endswith("\n"):
-        lines.pop()
-    rows = []
-    for values in csv.reader(lines[2:]):
-        if len(values) != len(COLUMNS):
-            continue
-        parsed: dict[str, Any] = {f.name: _parse(f.type, text) for f, text in zip(fields(Row), values, strict=True)}
-        rows.append(Row(**parsed))
-    return study, rows
-
-
-def _parse(kind: object, text: str) -> int | float | str:
-    return text if kind == "str" else int(text) if kind == "int" else float(text)
+    return row_file.read_rows(file, Row)
 
 
 # --- summary

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import argparse
 import concurrent.futures
-import contextlib
-import os
 import pathlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -16,6 +14,7 @@ from sigmaik._extras import need
 from sigmaik_lab.options import add_arms, add_output, open_arms
 from sigmaik_lab.report import Csv, Picture, Report
 from sigmaik_lab.study import Progress
+from sigmaik_lab.work import add_work, check_work, executor
 
 from .experiment import MonteCarlo, Row, run_study, summarize_study
 from .table import study_table
@@ -62,19 +61,14 @@ def options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--between-nodes", action="store_true", help="keep limits of position between the nodes, as the paper does not"
     )
-    work = parser.add_argument_group("where it runs")
-    work.add_argument(
-        "--jobs", type=int, default=os.cpu_count() or 1, metavar="N", help="processes on this machine (all cores)"
-    )
-    work.add_argument("--dask", metavar="ADDRESS", help="a Dask scheduler instead, such as tcp://host:8786")
+    add_work(parser)
     add_output(parser, "sigmaik-montecarlo")
 
 
 def load(args: argparse.Namespace) -> Iterable[Job]:
     if args.solver == "ipopt":
         need("casadi")
-    if args.jobs < 1:
-        raise ValueError("--jobs must be at least 1")
+    check_work(args)
     every = sk.singularities.names()
     open_arms(args, every)
     studies = [
@@ -93,9 +87,9 @@ def load(args: argparse.Namespace) -> Iterable[Job]:
         )
         for robot in (every if args.robot == "all" else args.robot.split(","))
     ]
-    with _executor(args) as (executor, jobs):
+    with executor(args) as (pool, jobs):
         for study in studies:
-            yield Job(study, args.out / f"{_stem(study)}.csv", executor, jobs)
+            yield Job(study, args.out / f"{_stem(study)}.csv", pool, jobs)
 
 
 def run(job: Job, progress: Progress) -> list[Row]:
@@ -124,18 +118,3 @@ def report(job: Job, rows: list[Row]) -> Report:
 def _stem(study: MonteCarlo) -> str:
     words = [word for word, said in (("ipopt", study.solver == "ipopt"), ("generic", study.generic)) if said]
     return "-".join([study.name, f"montecarlo-w{study.time_weight:g}", *words])
-
-
-@contextlib.contextmanager
-def _executor(args: argparse.Namespace) -> Iterator[tuple[concurrent.futures.Executor | None, int]]:
-    if args.dask is not None:
-        need("distributed")
-        from distributed import Client
-
-        with Client(args.dask, timeout="10s") as client:  # type: ignore[no-untyped-call]
-            yield client.get_executor(), max(1, len(client.nthreads()))
-    elif args.jobs == 1:
-        yield None, 1
-    else:
-        with concurrent.futures.ProcessPoolExecutor(args.jobs) as pool:
-            yield pool, args.jobs
