@@ -9,12 +9,14 @@ import pytest
 import sigmaik as sk
 from sigmaik_lab.__main__ import main
 from sigmaik_lab.arrival import experiment as arrival
+from sigmaik_lab.arrival.judge import Motion, departure, held_limits, judge
+from sigmaik_lab.arrival.servos import SERVOS
 from sigmaik_lab.arrival.summary import summarize_arrivals
 
 
 def excess(servo, q, qdot, dt, start=None):
     """The largest excess over the limits that the servo holds: parts of the limit, rad for positions."""
-    velocity, acceleration, jerk = arrival.held_limits(servo)
+    velocity, acceleration, jerk = held_limits(servo.chain)
     first = np.zeros(servo.chain.dof) if start is None else start
     change = np.diff(qdot, axis=0, prepend=first[None]) / dt
     worst = [(q - servo.chain.limits.upper).max(), (servo.chain.limits.lower - q).max()]
@@ -68,22 +70,51 @@ def test_trials_are_inside_the_limits_and_the_same_each_time():
 
 
 def test_what_counts_as_arrived_and_what_as_an_excess():
-    servo = arrival.make_servo("default", sk.robots.load("ur10"), 100.0)
-    home = sk.robots.home("ur10")
-    q, qdot, error = np.tile(home, (6, 1)), np.zeros((5, 6)), np.zeros((6, 6))
-    judged = arrival._judge(servo, q, qdot, error, 100.0)
-    assert judged == (0.0, 0.0, 0.0, True, 0.0, 0.0)
-    error[3, 0] = 2e-3  # it leaves again
-    assert arrival._judge(servo, q, qdot, error, 100.0)[0] == pytest.approx(0.04)
-    error[5, 4] = 0.01
-    assert arrival._judge(servo, q, qdot, error, 100.0)[0] == math.inf
+    chain, home = sk.robots.load("ur10"), sk.robots.home("ur10")
+    goal = chain.pose(home)
+    q, qdot = np.tile(home, (6, 1)), np.zeros((5, 6))
+
+    def judged(**other):
+        return judge(chain, Motion(**{"q": q, "qdot": qdot, "start_qdot": np.zeros(6), **other}), goal, 100.0)
+
+    still = judged()
+    assert (still["time"], still["position"], still["rest"], still["speed"]) == (0.0, 0.0, True, 0.0)
+    assert (still["excess"], still["over"], still["jump"], still["departure"]) == (0.0, 0.0, 0.0, 0.0)
+    q[3, 0] += 0.01  # it leaves again
+    assert judged()["time"] == pytest.approx(0.04)
+    assert judged(failed=True)["time"] == math.inf
+    q[5, 5] += math.radians(0.6)  # turns the tool alone
+    assert judged()["time"] == math.inf
+    assert judged()["angle"] == pytest.approx(math.radians(0.6))
+    q[5, 5] -= math.radians(0.2)
+    assert judged()["time"] == pytest.approx(0.04)
     moving = qdot.copy()
     moving[4, 2] = 0.01
-    assert not arrival._judge(servo, q, moving, error, 100.0)[3]
+    assert not judged(qdot=moving)["rest"]
     moving[4, 2] = 0.11  # in a cycle of 10 ms: 11 rad/s², and 10 are assumed
-    assert arrival._judge(servo, q, moving, error, 100.0)[5] == pytest.approx(0.1)
-    q[2, 0] = servo.chain.limits.upper[0] + 0.2
-    assert arrival._judge(servo, q, moving, error, 100.0)[5] == pytest.approx(0.2)
+    found = judged(qdot=moving)
+    assert (found["excess"], found["jump"], found["over"]) == (pytest.approx(0.1), pytest.approx(1.1), 0.0)
+    moving[:] = 2.0 * chain.limits.velocity
+    assert judged(qdot=moving, start_qdot=moving[0])["over"] == pytest.approx(1.0)
+    q[2, 0] = chain.limits.upper[0] + 0.2
+    assert judged()["over"] == pytest.approx(0.2)
+
+
+def test_the_departure_is_the_distance_from_the_line_and_not_from_its_prolongation():
+    path = np.array([[0.0, 0.0, 0.0], [0.5, 0.0, 0.02], [1.0, 0.0, 0.0]])
+    goal = np.array([1.0, 0.0, 0.0])
+    assert departure(path, goal) == pytest.approx(0.02)
+    assert departure(np.vstack([path, [1.3, 0.4, 0.0]]), goal) == pytest.approx(0.5)  # overshoot counts
+    assert departure(path, path[0]) == pytest.approx(1.0)  # a target where the tool is
+    rng = np.random.default_rng(5)
+    for _ in range(20):  # invariant under rigid motions; and no point is farther than the densest search says
+        turn, shift = sk.rotation_exp(rng.normal(size=3)), rng.normal(size=3)
+        points, end = rng.normal(size=(7, 3)), rng.normal(size=3)
+        found = departure(points, end)
+        assert departure(points @ turn.T + shift, turn @ end + shift) == pytest.approx(found)
+        line = points[0] + np.linspace(0.0, 1.0, 20001)[:, None] * (end - points[0])
+        nearest = [np.linalg.norm(line - point, axis=1).min() for point in points]
+        assert found == pytest.approx(max(nearest), abs=1e-6)
 
 
 def test_command(tmp_path, capsys):
@@ -94,9 +125,7 @@ def test_command(tmp_path, capsys):
     assert (tmp_path / "arms-arrival-near.png").stat().st_size > 5_000
     with (tmp_path / "arms-arrival-near.csv").open() as stream:
         rows = list(csv.DictReader(stream))
-    assert [(row["robot"], row["servo"]) for row in rows] == [
-        (r, s) for r in ("ur10", "puma560") for s in arrival.SERVOS
-    ]
+    assert [(row["robot"], row["servo"]) for row in rows] == [(r, s) for r in ("ur10", "puma560") for s in SERVOS]
     assert all(float(row["excess"]) == 0.0 for row in rows)
 
 

@@ -7,8 +7,10 @@ Units: m, rad, s; for prismatic joints m in place of rad.
 
 from __future__ import annotations
 
+import dataclasses
 import math
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,20 +19,21 @@ from numpy.typing import NDArray
 import sigmaik as sk
 from sigmaik._types import Array
 
+from .driven import DrivenServo
+from .judge import Motion, TrialRow, joint_time, judge
+from .servos import make_driven
+
 __all__ = [
-    "ARRIVED",
     "ON_TIME",
-    "SERVOS",
     "TARGETS",
     "TIMES",
     "ArrivalSettings",
     "Arrivals",
     "Trial",
+    "arrivals",
     "draw_trials",
     "drive",
-    "held_limits",
-    "joint_time",
-    "make_servo",
+    "drive_trial",
 ]
 
 #: Kinds of targets.
@@ -42,14 +45,6 @@ TARGETS: dict[str, str] = {
     "zeros": "from all joints at zero, a step of 0.2 characteristic lengths along an axis or of 0.2 rad about it, in "
     "turn, where PositionIk finds a configuration",
 }
-#: Servos that the study compares.
-SERVOS: dict[str, str] = {
-    "default": "sk.Servo(arm)",
-    "guided": "sk.Servo(arm, guided=True)",
-    "fixed": "J-PARSE with γ = 0.02, not adaptive",
-}
-#: [m, rad] A tip this near has arrived: 1 mm, 0.5°.
-ARRIVED = (1e-3, math.radians(0.5))
 #: [s] of a trial, where --time does not say.
 TIMES = {"near": 4.0, "random": 10.0, "beyond": 30.0, "home": 10.0, "zeros": 8.0}
 STEP = 0.2  #: [rad, or characteristic lengths] of `zeros`
@@ -58,7 +53,6 @@ RANGE = 0.98  #: part of a joint's range in which starts and targets are drawn
 TURN = math.pi  #: [rad or m] to both sides: the range of a joint without position limits
 AWAY = 4.0  #: [s] for which a trial of `home` goes out of reach
 ON_TIME = (5.0, 1.5)  #: an arrival is on time within 5 s, or 1.5 times the least time of the joints
-RESTING = 1e-3  #: part of the velocity limit (or rad/s, m/s): a slower joint rests
 
 
 @dataclass(frozen=True)
@@ -112,16 +106,21 @@ class Trial:
 
 @dataclass(frozen=True)
 class Arrivals:
-    """What a servo did in all trials. A row per trial."""
+    """What a servo did in all trials. A row per trial; the fields of `TrialRow`."""
 
     time: Array  #: (N,) [s] from which on the tip stays within `ARRIVED`; inf: the tip did not arrive
     position: Array  #: (N,) [m] the error at the end
     angle: Array  #: (N,) [rad]
     rest: NDArray[np.bool_]  #: (N,) whether all joints rest at the end
     speed: Array  #: (N,) [rad/s or m/s] of the fastest joint at the end
-    excess: Array  #: (N,) the largest excess over a limit: part of the limit, and of positions rad or m; 0: none
+    excess: Array  #: (N,) the largest excess over any limit: part of the limit, and of positions rad or m; 0: none
+    over: Array  #: (N,) the same, over limits of position, velocity and jerk alone
+    jump: Array  #: (N,) the largest change of q̇ in one cycle, as a part of what the acceleration limits allow
+    departure: Array  #: (N,) [m] the tip's largest distance from the line between its start and the target
+    cycle: Array  #: (N,) [s] the mean wall time of an update
     least: Array  #: (N,) [s] in which the joints can get to the nearest configuration that PositionIk finds; inf: none
     led: NDArray[np.bool_]  #: (N,) whether the guide led the joints away from the tool's own way
+    failed: NDArray[np.bool_]  #: (N,) whether the servo raised an error; such a trial has not arrived
 
 
 def draw_trials(chain: sk.Chain, settings: ArrivalSettings) -> list[Trial]:
@@ -174,107 +173,68 @@ def _steps_from_zeros(chain: sk.Chain, most: int) -> list[Trial]:
     return trials[:most]
 
 
-def make_servo(name: str, chain: sk.Chain, rate: float) -> sk.Servo:
-    """A servo of `SERVOS`, or one with a method by name. Error where there is neither."""
-    if name not in SERVOS:
-        return sk.Servo(chain, sk.methods.parse(name), dt=1.0 / rate)
-    if name != "fixed":
-        return sk.Servo(chain, dt=1.0 / rate, guided=name == "guided")
-    rule = sk.JParse(gamma=0.02, adaptive=False)
-    return sk.Servo(chain, rule, dt=1.0 / rate, gain_linear=10.0, gain_angular=10.0)
-
-
-def held_limits(servo: sk.Servo) -> tuple[Array, Array, Array]:
-    """(n,) limits of velocity, acceleration and jerk that the servo holds, the assumed ones too."""
-    limits = servo.chain.limits
-    assumed = float(servo.options["assumed_acceleration"])
-    acceleration = np.where(np.isfinite(limits.acceleration), limits.acceleration, assumed)
-    return limits.velocity, acceleration, limits.jerk
-
-
 def drive(
     chain: sk.Chain,
-    trials: list[Trial],
+    trials: Sequence[Trial],
     name: str,
     settings: ArrivalSettings,
     progress: Callable[[], None] | None = None,
 ) -> Arrivals:
-    """Drives a servo (see `make_servo`) to all targets. progress: called after each trial."""
-    servo = make_servo(name, chain, settings.rate)
-    ik = sk.PositionIk(chain)
-    cycles = settings.cycles
-    columns = []
-    for trial in trials:
-        q, qdot, error = np.empty((cycles + 1, chain.dof)), np.empty((cycles, chain.dof)), np.empty((cycles + 1, 6))
-        servo.reset(trial.start)
-        start_qdot = np.zeros(chain.dof)
-        if trial.before is not None:
-            for _ in range(round(AWAY * settings.rate)):
-                start_qdot = servo.update(trial.before).qdot
-        q[0] = servo.q
-        led = False
-        for k in range(cycles):
-            step = servo.update(trial.target)
-            q[k + 1], qdot[k], error[k] = step.q, step.qdot, step.pose_error
-            led = led or step.guide == sk.GuideState.CHANGING_BRANCH
-        error[cycles] = sk.pose_error(chain.pose(q[cycles]), trial.target)
-        found = ik.solve(trial.target, near=q[0])
-        least = joint_time(servo, q[0], found.q) if found.status == sk.PositionIkStatus.OK else math.inf
-        columns.append((*_judge(servo, q, qdot, error, settings.rate, start_qdot), least, led))
+    """Drives a servo (see `make_driven`) to all targets. progress: called after each trial."""
+    servo = make_driven(name, chain, settings.rate)
+    rows = []
+    for number, trial in enumerate(trials):
+        rows.append(drive_trial(chain, trial, servo, settings, ("", name, number)))
         if progress is not None:
             progress()
-    return Arrivals(*(np.array(column) for column in zip(*columns, strict=True)))
+    return arrivals(rows)
 
 
-def joint_time(servo: sk.Servo, start: Array, goal: Array) -> float:
-    """[s] of the fastest motion of all joints from rest at `start` to rest at `goal`, without jerk limits."""
-    velocity, acceleration, _ = held_limits(servo)
-    way = np.abs(goal - start)
-    ramps = 2.0 * np.sqrt(way / acceleration)  # never at full speed
-    with np.errstate(invalid="ignore"):
-        cruise = way / velocity + velocity / acceleration
-    return float(np.where(way * acceleration > velocity**2, cruise, ramps).max())
+def arrivals(rows: Sequence[TrialRow]) -> Arrivals:
+    """The rows of one arm and servo, as arrays."""
+    names = [field.name for field in dataclasses.fields(Arrivals)]
+    return Arrivals(*(np.array([getattr(row, name) for row in rows]) for name in names))
 
 
-def _judge(
-    servo: sk.Servo, q: Array, qdot: Array, error: Array, rate: float, start_qdot: Array | None = None
-) -> tuple[float, float, float, bool, float, float]:
-    position, angle = np.linalg.norm(error[:, :3], axis=1), np.linalg.norm(error[:, 3:], axis=1)
-    away = np.flatnonzero((position > ARRIVED[0]) | (angle > ARRIVED[1]))
-    first = int(away[-1]) + 1 if len(away) else 0
-    time = first / rate if first < len(position) else math.inf
-    velocity, acceleration, jerk = held_limits(servo)
-    last = np.abs(qdot[-1])
-    rest = bool(np.all(last <= RESTING * np.where(np.isfinite(velocity), velocity, 1.0)))
-    return (
-        time,
-        float(position[-1]),
-        float(angle[-1]),
-        rest,
-        float(last.max()),
-        _excess(servo, q, qdot, rate, start_qdot),
+def drive_trial(
+    chain: sk.Chain, trial: Trial, servo: DrivenServo, settings: ArrivalSettings, label: tuple[str, str, int]
+) -> TrialRow:
+    """One trial. label: names of arm and servo, and the trial's number, for the row."""
+    motion = _move(chain, trial, servo, settings)
+    found = sk.PositionIk(chain).solve(trial.target, near=motion.q[0])
+    least = joint_time(chain, motion.q[0], found.q) if found.status == sk.PositionIkStatus.OK else math.inf
+    return TrialRow(
+        *label,
+        **judge(chain, motion, trial.target, settings.rate),
+        least=least,
+        setup=f"{servo.version}: {servo.settings}",
     )
 
 
-def _excess(servo: sk.Servo, q: Array, qdot: Array, rate: float, start_qdot: Array | None = None) -> float:
-    """The largest excess over a limit, by differences of the commands, as a robot's controller checks them.
-
-    What the rounding of the differences can make is not counted. start_qdot: (n,) before the first command; None: zero.
-    After a motion, the jerk of the first cycle is not known.
-    """
-    limits = servo.chain.limits
-    velocity, acceleration, jerk = held_limits(servo)
-    moving = start_qdot is not None and bool(np.any(start_qdot != 0.0))
-    before = np.zeros(servo.chain.dof) if start_qdot is None else start_qdot
-    change = np.diff(qdot, axis=0, prepend=before[None]) * rate
-    change_of_change = np.diff(change, axis=0, prepend=change[:1] if moving else 0.0) * rate
-    rounding = 4.0 * np.finfo(float).eps * max(1.0, float(np.abs(qdot).max()))
-    worst = max(0.0, float((q - limits.upper).max()), float((limits.lower - q).max()))
-    for value, limit, slack in (
-        (qdot, velocity, rounding),
-        (change, acceleration, rounding * rate),
-        (change_of_change, jerk, 2.0 * rounding * rate**2),
-    ):
-        over = (np.abs(value) - slack) / limit - 1.0  # −1 without a limit
-        worst = max(worst, float(over.max()))
-    return worst
+def _move(chain: sk.Chain, trial: Trial, servo: DrivenServo, settings: ArrivalSettings) -> Motion:
+    """The motion of a trial. Where a servo raises an error or its answer is not finite, the arm stands still, and the
+    servo has failed."""
+    cycles, clock = settings.cycles, time.perf_counter_ns
+    q, qdot = np.empty((cycles + 1, chain.dof)), np.zeros((cycles, chain.dof))
+    start_qdot = np.zeros(chain.dof)
+    taken, led, k, failed = 0, False, 0, False
+    servo.reset(trial.start)
+    q[0] = trial.start
+    try:
+        if trial.before is not None:
+            for _ in range(round(AWAY * settings.rate)):
+                start_qdot = servo.update(trial.before)
+            q[0] = servo.q
+        for k in range(cycles):
+            begin = clock()
+            command = servo.update(trial.target)
+            taken += clock() - begin
+            if not np.all(np.isfinite(command)):
+                raise ValueError("a command that is not finite")
+            q[k + 1], qdot[k] = servo.q, command
+            led = led or servo.led
+        k = cycles
+    except Exception:  # whatever a peer may raise in its loop
+        failed = True
+        q[k + 1 :] = q[k]
+    return Motion(q, qdot, start_qdot, 1e-9 * taken / max(1, k), led, failed)

@@ -28,6 +28,12 @@ class ArrivalSummary:
     at_rest: float  #: share of trials at whose end all joints rest
     end_speed: float  #: [rad/s or m/s] the fastest joint at the end of any trial
     excess: float  #: the largest excess over any limit, a part of the limit, or rad or m; 0: every limit was held
+    over: float  #: the same, over limits of position, velocity and jerk alone
+    jump: float  #: the largest change of q̇ in one cycle, as a part of what the acceleration limits allow
+    departure: float  #: [m] the tool's largest distance from the line between start and target, median of the trials
+    end_error: float  #: [m] the position error at the end, median of the trials
+    cycle: float  #: [s] the mean wall time of an update, median of the trials
+    failed: float  #: share of trials in which the servo raised an error; these have not arrived
 
 
 def summarize_arrivals(robot: str, targets: str, servo: str, done: Arrivals) -> ArrivalSummary:
@@ -49,4 +55,10 @@ def summarize_arrivals(robot: str, targets: str, servo: str, done: Arrivals) -> 
         at_rest=float(done.rest.mean()),
         end_speed=float(done.speed.max()),
         excess=float(done.excess.max()),
+        over=float(done.over.max()),
+        jump=float(done.jump.max()),
+        departure=float(np.median(done.departure)),
+        end_error=float(np.median(done.position)),
+        cycle=float(np.median(done.cycle)),
+        failed=float(done.failed.mean()),
     )
