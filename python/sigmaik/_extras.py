@@ -9,7 +9,13 @@ from ._core import Error
 __all__ = ["MissingPackage", "installed", "need"]
 
 #: pip's requirement for a module, where the requirement differs from the module's name.
-_REQUIREMENTS = {"distributed": "'dask[distributed]'", "mujoco": "'mujoco>=3'", "viser": "'viser>=1'"}
+_REQUIREMENTS = {
+    "distributed": "'dask[distributed]'",
+    "mujoco": "'mujoco>=3'",
+    "optik": "optik-py",
+    "placo": "'placo>=0.10'",
+    "viser": "'viser>=1'",
+}
 
 
 class MissingPackage(Error, ImportError):

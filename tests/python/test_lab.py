@@ -77,7 +77,7 @@ def options_of(name):
 def test_all_commands_are_found():
     assert set(STUDIES) == {
         "arrival", "axis5", "cart", "drill", "execute", "limits", "montecarlo", "reach", "reaching", "round-table",
-        "track",
+        "solvers", "track",
     }  # fmt: skip
     assert set(study.names()) - set(STUDIES) == {"info", "robots", "teleop"}
     for name in study.names():
@@ -287,6 +287,7 @@ def test_every_study_says_how_far_it_is(name, tmp_path):
         "montecarlo": "--robot franka_panda --samples 2 --jobs 1 --objective none",
         "reach": "--robot ur10 --method dls --limits on --rate 50",
         "reaching": "--robot ur10 --tasks 2 --method straight",
+        "solvers": "--trials 1 --solver PositionIk",
         "track": "--robot ur10 --target line --duration 5 --rate 200 --method jparse --mode predict,hold",
     }.get(name, "")
     args = runner.parsed(name, [*words.split(), "--out", str(tmp_path)])
