@@ -18,6 +18,7 @@ from collections.abc import Callable
 import numpy as np
 
 import sigmaik as sk
+from sigmaik_lab.arrival.peers import make_peer
 
 CYCLES, ROUNDS = 300, 7
 HOME = np.array([0.0, -0.35, 0.2, 1.05, 0.1, 1.4, 0.0])
@@ -95,9 +96,21 @@ def mink_cycle() -> Callable[[int], object]:
     return cycle
 
 
+def driven_peer(name: str) -> Callable[[int], object]:
+    """A peer of `sigmaik arrival`, with its settings there. The peer integrates its commands, as our servo does."""
+    arm = sk.robots.load("ufactory_xarm7")
+    peer = make_peer(name, arm, 1e-3)
+    peer.reset(HOME)
+    targets = list(arm.pose(PATH))
+    return lambda i: peer.update(targets[i])
+
+
 CANDIDATES: dict[str, tuple[Callable[[], Callable[[int], object]], tuple[str, ...]]] = {
     "sigmaik Servo.update": (sigmaik_servo, ("sigmaik",)),
     "Pinocchio + jparse-robotics": (pinocchio_jparse, ("pin", "jparse-robotics")),
+    "PlaCo": (lambda: driven_peer("placo"), ("placo",)),
+    "OInK": (lambda: driven_peer("oink"), ("roboplan-oink",)),
+    "EmbodiK": (lambda: driven_peer("embodik"), ("embodik",)),
     "Pink, quadprog": (lambda: pink_cycle("quadprog", "quadprog"), ("pin-pink", "quadprog")),
     "Pink, proxqp": (lambda: pink_cycle("proxqp", "proxsuite"), ("pin-pink", "proxsuite")),
     "mink, daqp": (mink_cycle, ("mink", "daqp")),

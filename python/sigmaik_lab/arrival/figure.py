@@ -15,7 +15,14 @@ from .experiment import Arrivals
 __all__ = ["arrival_figure"]
 
 _STYLES = {"default": ("#0072B2", "-"), "guided": ("#D55E00", "-"), "fixed": ("#7A5C3E", (0, (5, 1.5)))}
-_OTHERS = [("#009E73", (0, (5, 1.5))), ("#555555", (0, (1.5, 1.5))), ("#CC79A7", (0, (4, 1, 1, 1)))]
+_OTHERS = [
+    ("#009E73", (0, (5, 1.5))),
+    ("#555555", (0, (1.5, 1.5))),
+    ("#CC79A7", (0, (4, 1, 1, 1))),
+    ("#56B4E9", "-"),
+    ("#E69F00", (0, (5, 1.5))),
+    ("#8B8B00", (0, (1.5, 1.5))),
+]
 
 
 def arrival_figure(title: str, seconds: float, done: Mapping[str, Mapping[str, Arrivals]]) -> Figure:

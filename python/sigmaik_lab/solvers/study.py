@@ -84,7 +84,7 @@ def report(experiment: SolversExperiment, rows: list[SolverRow]) -> Report:
         return solvers_figure(f"{e.arm.name}: solvers of positions, {e.trials} trials of each group", rows)
 
     return Report(
-        [headline, *panel_tables(summaries)],
+        [headline, *panel_tables(rows)],
         [
             Csv(f"{stem}-trials", functools.partial(save_rows, rows)),
             Csv(stem, functools.partial(save_rows, summaries)),

@@ -10,19 +10,19 @@ import numpy as np
 from sigmaik_lab.report import Table, compact
 
 from .cases import BINS, STARTS
-from .experiment import SolverSummary
+from .experiment import SolverRow, summarize_solvers
 
 __all__ = ["panel_tables"]
 
 
-def panel_tables(rows: Sequence[SolverSummary]) -> list[Table]:
+def panel_tables(rows: Sequence[SolverRow]) -> list[Table]:
     """A table for each of the four panels, a line for each solver.
 
     Error: share solved and mean error, by condition number. Amplification: share that made the step, and the median way
     of the joints, where the step was made, as a multiple of the least way of the linearised problem. Starts: share
     solved. Cost: median and 95 % of all cases.
     """
-    found = {(row.solver, row.panel, row.group): row for row in rows}
+    found = {(row.solver, row.panel, row.group): row for row in summarize_solvers(rows)}
     solvers = list(dict.fromkeys(row.solver for row in rows))
     error = Table("error by condition number: solved, mean error", "solver")
     steps = Table("a step of 1 mm by condition number: made, joint way × the least", "solver")
@@ -39,9 +39,8 @@ def panel_tables(rows: Sequence[SolverSummary]) -> list[Table]:
         mine = [found[solver, "amplification", name] for name in BINS]
         steps.add_row(solver, *(text for row in mine for text in (_share(row.solved), compact(row.ratio))))
         starts.add_row(solver, *(_share(found[solver, "starts", name].solved) for name in STARTS))
-        seconds = [row for row in rows if row.solver == solver]
-        median = float(np.median([row.median_seconds for row in seconds]))
-        cost.add_row(solver, compact(1e6 * median), compact(1e6 * max(row.seconds_95 for row in seconds)))
+        seconds = [1e6 * row.seconds for row in rows if row.solver == solver]
+        cost.add_row(solver, compact(float(np.median(seconds))), compact(float(np.percentile(seconds, 95))))
     return [error, steps, starts, cost]
 
 
