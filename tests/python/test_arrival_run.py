@@ -99,6 +99,10 @@ def test_a_peer_that_raises_an_error_has_not_arrived_and_stands_still(after):
     assert row.failed
     assert row.time == math.inf
     assert row.speed == 0.0
+    if after == 0:
+        assert (row.jump, row.over, row.cycle) == (0.0, 0.0, 0.0)
+    whole = drive_trial(chain, trial, Newton(chain, 5e-3), SETTINGS, ("", "", 0))
+    assert row.jump in (0.0, whole.jump)  # the stop is not the servo's command
     nan = Newton(chain, 5e-3)
     nan.update = lambda target: np.full(6, math.nan)
     row = drive_trial(chain, trial, nan, SETTINGS, ("", "", 0))

@@ -237,4 +237,4 @@ def _move(chain: sk.Chain, trial: Trial, servo: DrivenServo, settings: ArrivalSe
     except Exception:  # whatever a peer may raise in its loop
         failed = True
         q[k + 1 :] = q[k]
-    return Motion(q, qdot, start_qdot, 1e-9 * taken / max(1, k), led, failed)
+    return Motion(q, qdot, start_qdot, 1e-9 * taken / max(1, k), led, failed, k)

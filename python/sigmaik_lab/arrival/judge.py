@@ -32,6 +32,7 @@ class Motion:
     cycle: float = 0.0  #: [s] the mean wall time of an update
     led: bool = False  #: whether the guide led the joints away from the tool's own way
     failed: bool = False  #: whether the servo raised an error
+    commanded: int | None = None  #: cycles with a command; None: all. The stop after a failure is no command.
 
 
 @dataclass(frozen=True)
@@ -121,15 +122,18 @@ def _excess(chain: sk.Chain, motion: Motion, rate: float) -> tuple[float, tuple[
     """
     limits, (velocity, acceleration, jerk) = chain.limits, held_limits(chain)
     moving = bool(np.any(motion.start_qdot != 0.0))
-    change = np.diff(motion.qdot, axis=0, prepend=motion.start_qdot[None]) * rate
+    qdot = motion.qdot[: motion.commanded]
+    if not len(qdot):
+        return 0.0, (0.0, 0.0)
+    change = np.diff(qdot, axis=0, prepend=motion.start_qdot[None]) * rate
     change_of_change = np.diff(change, axis=0, prepend=change[:1] if moving else 0.0) * rate
-    rounding = 4.0 * np.finfo(float).eps * max(1.0, float(np.abs(motion.qdot).max()))
+    rounding = 4.0 * np.finfo(float).eps * max(1.0, float(np.abs(qdot).max()))
 
     def beyond(value: Array, limit: Array, slack: float) -> float:
         return max(0.0, float(((np.abs(value) - slack) / limit - 1.0).max()))  # −1 without a limit
 
     outside = max(0.0, float((motion.q - limits.upper).max()), float((limits.lower - motion.q).max()))
-    swift = beyond(motion.qdot, velocity, rounding)
+    swift = beyond(qdot, velocity, rounding)
     jerky = beyond(change_of_change, jerk, 2.0 * rounding * rate**2)
     jump = float((np.abs(change) / acceleration).max())
     return max(outside, swift, jerky), (jump, beyond(change, acceleration, rounding * rate))
