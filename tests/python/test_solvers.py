@@ -96,6 +96,7 @@ def test_position_ik_solves_all_reachable_targets(name):
     assert max(row.error for row in rows) < 1e-6
 
 
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")  # of hppfcl, in pinocchio 3
 @pytest.mark.parametrize("name", SOLVERS)
 def test_solvers_make_small_steps_far_from_singularities(name):
     try:

@@ -29,7 +29,9 @@ def arrival_figure(title: str, seconds: float, done: Mapping[str, Mapping[str, A
     """The share of the trials that have arrived over time. done: of each arm and servo. A panel for each arm."""
     columns = min(3, len(done))
     rows = math.ceil(len(done) / columns)
-    figure = empty_figure(3.4 * columns + 0.6, 2.5 * rows + 0.8, title, x=0.01, ha="left")
+    most = max(map(len, done.values()))  # names in the legend, of which three stand under a panel
+    width = 3.4 * columns + 0.6 if most <= 3 * columns else max(6.2, 3.4 * columns + 0.6)
+    figure = empty_figure(width, 2.5 * rows + 0.8, title, x=0.01, ha="left")
     grid = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
     for axes in grid.flat[len(done) :]:
         axes.set_visible(False)
@@ -50,5 +52,12 @@ def arrival_figure(title: str, seconds: float, done: Mapping[str, Mapping[str, A
             axes.set_xlabel("time [s]", fontsize=9)
             axes.tick_params(labelbottom=True)
     handles, labels = grid[0][0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), frameon=False, fontsize=9)
+    figure.legend(
+        handles,
+        labels,
+        loc="outside lower center",
+        ncols=min(len(labels), max(3, 3 * columns)),
+        frameon=False,
+        fontsize=9,
+    )
     return figure

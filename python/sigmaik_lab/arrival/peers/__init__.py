@@ -32,6 +32,7 @@ class PeerPackage:
     packages: tuple[str, ...]  #: as pip names them, the peer first
     about: str
     accelerates: bool = False  #: whether the peer has acceleration limits of its own
+    clips: bool = True  #: whether its commands may be cut; EmbodiK stops where its commands are not obeyed
     note: str = ""  #: what pip does not tell
 
 
@@ -55,7 +56,7 @@ PEERS = {
     ),
     "mink": PeerPackage("mink_peer", ("mink", "mujoco", "daqp"), ("mink", "daqp"), "mink, a QP in Python on MuJoCo"),
     "embodik": PeerPackage(
-        "embodik_peer", ("embodik",), ("embodik",), "EmbodiK, prioritised tasks in C++", accelerates=True
+        "embodik_peer", ("embodik",), ("embodik",), "EmbodiK, prioritised tasks in C++", accelerates=True, clips=False
     ),
     "jparse-robotics": PeerPackage(
         "jparse_peer",
@@ -104,9 +105,9 @@ def split_peer(name: str) -> tuple[str, str]:
     base, plus, variant = name.partition("+")
     if base not in PEERS:
         raise ValueError(f"no peer '{base}'; there are {', '.join(PEERS)}")
-    if plus and (variant not in VARIANTS or (variant == "acceleration" and not PEERS[base].accelerates)):
-        with_limits = ", ".join(peer for peer in PEERS if PEERS[peer].accelerates)
-        raise ValueError(f"no servo '{name}'; a peer's variants are +clip, and +acceleration of {with_limits}")
+    known = [*(["clip"] if PEERS[base].clips else []), *(["acceleration"] if PEERS[base].accelerates else [])]
+    if plus and variant not in known:
+        raise ValueError(f"no servo '{name}'; there are {', '.join([base, *(f'{base}+{other}' for other in known)])}")
     return base, variant
 
 
