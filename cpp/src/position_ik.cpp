@@ -18,11 +18,11 @@ using Clock = std::chrono::steady_clock;
 using detail::Branches;
 using detail::Descent;
 using detail::DescentPoint;
-using detail::kApart;
 using detail::kLargest;
 using detail::require;
 
 constexpr int kPullsToMiddle = 100;
+constexpr double kApart = 1e-2;          // solutions differ by more than this in a joint [rad, or L]
 constexpr double kApartRedundant = 0.1;  // representatives of a redundant arm differ by more than this [rad, or L]
 
 bool acceptable(const Pose& pose) noexcept {

@@ -11,22 +11,24 @@
 namespace sigmaik::detail {
 namespace {
 
-// ½ of the second derivative of E, in units of `scale` of each joint. The second derivative of the orientation error is
-// that of a small one: the symmetric part of ∂ω_l/∂q_k.
-JointMatrix curvature(const DescentPoint& point, const Descent::Columns& columns, const JointVector& scale,
-                      double length) noexcept {
-  const Eigen::Index n = columns.cols();
+// ½ of the second derivative of E, in units of `scale` of each joint. With the twist s_k of joint k at the tip, and E's
+// derivatives −f and K with respect to the tip's twist,
+//     ½ ∂²E/∂q_k∂q_l = s_kᵀ K s_l − fᵀ ½ (∂s_k/∂q_l + ∂s_l/∂q_k)
+JointMatrix curvature(const Jacobian& jacobian, const JointVector& scale, const Row6& force,
+                      const Matrix6& stiffness) noexcept {
+  const Eigen::Index n = jacobian.cols();
   JacobianGradient gradient;
-  jacobian_gradient(point.state.jacobian, gradient);
-  const Eigen::Vector3d linear = point.residual.head<3>() / length, angular = 0.5 * point.residual.tail<3>();
+  jacobian_gradient(jacobian, gradient);
+  const Eigen::Vector3d linear = force.head<3>(), angular = 0.5 * force.tail<3>();
   JointMatrix h(n, n);
   for (Eigen::Index k = 0; k < n; ++k) {
+    const Row6 stiff = stiffness * jacobian.col(k);
     const Jacobian& of_k = gradient[static_cast<std::size_t>(k)];
     for (Eigen::Index l = 0; l <= k; ++l) {
       const Jacobian& of_l = gradient[static_cast<std::size_t>(l)];
       const double bend = linear.dot(of_k.col(l).head<3>()) +
                           angular.dot(of_k.col(l).tail<3>() + of_l.col(k).tail<3>());
-      h(k, l) = h(l, k) = columns.col(k).dot(columns.col(l)) - scale[k] * scale[l] * bend;
+      h(k, l) = h(l, k) = scale[k] * scale[l] * (stiff.dot(jacobian.col(l)) - bend);
     }
   }
   return h;
@@ -56,22 +58,26 @@ bool factorise(const JointMatrix& h, const std::array<int, kMaxJoints>& free, in
 
 }  // namespace
 
-// Minimises the quadratic model of E plus λ |Δq|²_W inside the limits, by the active set of step(). The method of
-// Levenberg and Marquardt leaves the second derivatives out, which is right where the error goes to zero quickly. At a
-// singularity the second derivatives are what moves the tip along the lost direction, and at a pose out of reach the
-// error does not go to zero.
+// Minimises the quadratic model of E plus λ |Δq|²_W inside the limits, by the active set of step(). Joints at a limit
+// that the gradient pushes further are fixed from the start (Bertsekas, 1982): E may be concave along these, and a λ
+// that is large for their sake would slow the others down. The method of Levenberg and Marquardt leaves the second
+// derivatives out, which is right where the error goes to zero quickly. At a singularity the second derivatives are
+// what moves the tip along the lost direction, and at a pose out of reach the error does not go to zero.
 JointVector Descent::curved_step(const DescentPoint& point, double damping, double& expected) const noexcept {
   const int n = static_cast<int>(point.q.size());
   const JointVector scale = problem_.reach.cwiseSqrt();
-  Columns columns(6, n);
-  derivative(point, columns);
-  for (int i = 0; i < n; ++i) columns.col(i) *= scale[i];
-  const JointMatrix h = curvature(point, columns, scale, problem_.length);
-  const JointVector slope = columns.transpose() * point.residual;
-  double lambda = damping + 1e-13 * std::max(columns.squaredNorm(), 1e-280);
+  const Pose& tip = point.state.tip;
+  const Row6 force = problem_.rows.force(tip, target_, shift_);
+  const JointMatrix h = curvature(point.state.jacobian, scale, force, problem_.rows.stiffness(tip, target_, shift_));
+  const JointVector slope = scale.cwiseProduct(point.state.jacobian.transpose() * force);
+  double lambda = damping + 1e-13 * std::max(h.diagonal().cwiseAbs().sum(), 1e-280);
 
   JointVector move = JointVector::Zero(n), next = point.q;  // `move` in units of `scale`
   std::uint32_t fixed = 0;
+  for (int i = 0; i < n; ++i) {
+    const bool pushed = slope[i] > 0.0 ? point.q[i] >= problem_.upper[i] : point.q[i] <= problem_.lower[i];
+    if (pushed && slope[i] != 0.0) fixed |= 1u << i;
+  }
   for (;;) {
     std::array<int, kMaxJoints> free;
     int count = 0;

@@ -11,12 +11,10 @@
 namespace sigmaik::detail {
 namespace {
 
-using Matrix6 = Eigen::Matrix<double, 6, 6>;
-
-constexpr double kRounding = 1e-10;  // [rad] of an angle
 constexpr double kTurn = 2.0 * std::numbers::pi;
 constexpr double kDamping = 1e-2, kLeast = 1e-5, kMost = 1e6;  // of the damping over E: at the start, least, most
-constexpr double kGrowth = 8.0;  // of the damping after a step that is not accepted; then twice, four times, … this
+constexpr double kGrowth = 8.0;     // of the damping after a step that is not accepted; then twice, four times, … this
+constexpr double kNothing = 1e-15;  // a step that promises to take less than this part of E away is none
 constexpr double kLeastDamping = 1e-13;  // part of the trace: keeps the factorisation positive at a singularity
 
 // Solves A x = b for a symmetric positive definite A, by A = L D Lᵀ. A's lower triangle becomes L and D.
@@ -44,20 +42,13 @@ inline void add_column(Matrix6& a, const Row6& column, double weight) noexcept {
   for (int j = 0; j < 6; ++j) a.col(j) += (weight * column[j]) * column;
 }
 
-Eigen::Matrix3d skew(const Eigen::Vector3d& x) noexcept {
-  Eigen::Matrix3d out;
-  out << 0.0, -x[2], x[1], x[2], 0.0, -x[0], -x[1], x[0], 0.0;
-  return out;
-}
-
 }  // namespace
 
-DescentProblem::DescentProblem(const Chain& arm, const Task& rows, const std::array<double, 2>& tolerances, bool turns)
+DescentProblem::DescentProblem(const Chain& arm, const PositionIkOptions& options, bool turns, double hold)
     : chain(arm),
-      task(rows),
-      whole(rows.whole()),
-      tolerance(tolerances),
       length(arm.characteristic_length()),
+      rows(options, length, hold),
+      tolerance(options.tolerance),
       lower(arm.limits().lower),
       upper(arm.limits().upper),
       reach(JointVector::Ones(arm.dof())) {
@@ -75,18 +66,20 @@ DescentProblem::DescentProblem(const Chain& arm, const Task& rows, const std::ar
   }
 }
 
-void DescentProblem::place(const JointRef& near, JointVector& q) const noexcept {
+bool DescentProblem::place(const JointRef& near, JointVector& q, double rounding) const noexcept {
   const JointLimits& limits = chain.limits();
+  bool inside = true;
   for (int i = 0; i < q.size(); ++i) {
-    if ((turning >> i & 1u) != 0) {
-      q[i] += kTurn * std::round((near[i] - q[i]) / kTurn);
-      // Rounding beyond a limit is no reason for a turn.
-      const double below = limits.lower[i] - kRounding - q[i], above = q[i] - limits.upper[i] - kRounding;
-      if (below > 0.0) q[i] += kTurn * std::ceil(below / kTurn);
-      if (above > 0.0) q[i] -= kTurn * std::ceil(above / kTurn);
+    if (chain.joint_types()[static_cast<std::size_t>(i)] != JointType::Prismatic) {
+      double turns = std::round((near[i] - q[i]) / kTurn);
+      turns += std::max(0.0, std::ceil((limits.lower[i] - rounding - q[i]) / kTurn - turns));
+      turns -= std::max(0.0, std::ceil((q[i] - limits.upper[i] - rounding) / kTurn + turns));
+      if (turns != 0.0) q[i] += kTurn * turns;
     }
+    inside = inside && q[i] >= limits.lower[i] - rounding && q[i] <= limits.upper[i] + rounding;
     q[i] = std::clamp(q[i], limits.lower[i], limits.upper[i]);
   }
+  return inside;
 }
 
 JointVector DescentProblem::difference(const JointVector& q, const JointVector& from) const noexcept {
@@ -100,54 +93,56 @@ JointVector DescentProblem::difference(const JointVector& q, const JointVector& 
 void Descent::evaluate(DescentPoint& point) const noexcept {
   update(problem_.chain, point.q, point.state);
   point.error = pose_error(point.state.tip, target_);
-  Twist rows = point.error;
-  if (!problem_.whole) {
-    const Eigen::Matrix3d rotation = point.state.tip.linear();
-    if (problem_.task.frame == Frame::Tool) {
-      rows.head<3>() = rotation.transpose() * point.error.head<3>();
-      rows.tail<3>() = rotation.transpose() * point.error.tail<3>();
-    }
-    for (int i = 0; i < 6; ++i) {
-      if (!problem_.task.mask[static_cast<std::size_t>(i)]) rows[i] = 0.0;
-    }
+  const PoseRows& rows = problem_.rows;
+  if (rows.plain()) {
+    point.residual = point.error;
+    point.residual.head<3>() /= problem_.length;
+  } else {
+    point.rows = rows.errors(point.state.tip, target_, point.error) + shift_;
+    point.residual = rows.weighted(rows.outside(point.rows));
   }
-  point.residual = rows;
-  point.residual.head<3>() /= problem_.length;
   point.cost = point.residual.squaredNorm();
 }
 
 bool Descent::reached(const DescentPoint& point) const noexcept {
-  return point.residual.head<3>().norm() * problem_.length <= problem_.tolerance[0] &&
-         point.residual.tail<3>().norm() <= problem_.tolerance[1];
+  if (shifted_) return false;
+  return problem_.tolerates(problem_.rows.plain() ? Row6(point.error) : problem_.rows.outside(point.rows));
 }
 
-// For a whole pose J is the Jacobian itself. The exact derivative of the orientation error φ has the factor J_r⁻¹(φ),
+bool Descent::reached_held(const DescentPoint& point) const noexcept {
+  return problem_.tolerates(problem_.rows.held(Row6(point.rows - shift_)));
+}
+
+// A step of the rows that are outside their ranges. Rows that the step would take outside are held at the end of their
+// range, and the step is computed again.
+//
+// Of a plain problem J is the Jacobian itself. The exact derivative of the orientation error φ has the factor J_r⁻¹(φ),
 // the inverse of SO(3)'s right Jacobian, which neither moves the minimum nor changes the gradient, because φᵀJ_r⁻¹(φ) =
 // φᵀ. With a part of the rows the factor matters, and so does the turn of the tool's axes.
-void Descent::derivative(const DescentPoint& point, Columns& columns) const noexcept {
-  const double inverse = 1.0 / problem_.length;
-  columns = point.state.jacobian;
-  if (!problem_.whole) {
-    const Eigen::Vector3d position = point.error.head<3>(), angle = point.error.tail<3>();
-    const bool tool = problem_.task.frame == Frame::Tool;
-    // ė_o = −J_r⁻¹(φ) ω = −J_l⁻¹(−φ) ω; in the tool's axes, d(Rᵀe) = Rᵀ(ė − ω × e).
-    Eigen::Matrix3d rate;
-    for (int i = 0; i < 3; ++i) rate.col(i) = rotation_log_rate(-angle, Eigen::Vector3d::Unit(i));
-    const Eigen::Matrix3d axes = tool ? Eigen::Matrix3d(point.state.tip.linear().transpose())
-                                      : Eigen::Matrix3d::Identity();
-    if (tool) rate -= skew(angle);
-    const Eigen::Matrix3d turn = axes * rate,
-                          swing = tool ? Eigen::Matrix3d(-axes * skew(position)) : Eigen::Matrix3d::Zero();
-    for (Eigen::Index j = 0; j < columns.cols(); ++j) {
-      const Eigen::Vector3d v = columns.col(j).head<3>(), omega = columns.col(j).tail<3>();
-      columns.col(j).head<3>() = axes * v + swing * omega;
-      columns.col(j).tail<3>() = turn * omega;
-    }
-    for (int i = 0; i < 6; ++i) {
-      if (!problem_.task.mask[static_cast<std::size_t>(i)]) columns.row(i).setZero();
-    }
+JointVector Descent::step(const DescentPoint& point, double damping, const JointVector* wish,
+                          const JointVector& inverse_weight, double& expected) const noexcept {
+  constexpr int kTries = 7;  // one for each row that may be added
+  Columns columns = point.state.jacobian;
+  const PoseRows& rows = problem_.rows;
+  if (rows.plain()) {
+    columns.topRows<3>() /= problem_.length;
+    return bounded_step(point.q, columns, point.residual, damping, wish, inverse_weight, expected);
   }
-  columns.topRows<3>() *= inverse;
+  RowErrors errors = rows.rates(point.state.tip, target_, point.error);
+  errors.y = point.rows;
+  PoseRows::Ends ends = rows.beyond(errors.y);
+  JointVector next;
+  for (int i = 0; i < kTries; ++i) {
+    Row6 residual;
+    Matrix6 matrix;
+    rows.linear(errors, ends, residual, matrix);
+    columns = matrix * point.state.jacobian;
+    next = bounded_step(point.q, columns, residual, damping, wish, inverse_weight, expected);
+    const Row6 ahead = errors.y - errors.rate * (point.state.jacobian * (next - point.q));
+    expected = rows.weighted(rows.outside(ahead)).squaredNorm();
+    if (!rows.add_beyond(ahead, ends)) break;
+  }
+  return next;
 }
 
 // Minimises |r − J Δq|² + λ Σ (Δq_i − wish_i)²/w_i inside the limits, through
@@ -155,13 +150,12 @@ void Descent::derivative(const DescentPoint& point, Columns& columns) const noex
 // of the joints that are free. A joint that this takes beyond a limit is fixed at the limit, and the others are
 // computed again. The result is q + Δq; `expected` is E there if the arm were linear, as r − J Δq = λ (J W Jᵀ + λ I)⁻¹
 // r.
-JointVector Descent::step(const DescentPoint& point, double damping, const JointVector* wish,
-                          const JointVector& inverse_weight, double& expected) const noexcept {
-  const int n = static_cast<int>(point.q.size());
-  Columns columns(6, n);
-  derivative(point, columns);
+JointVector Descent::bounded_step(const JointVector& q, const Columns& columns, const Row6& residual, double damping,
+                                  const JointVector* wish, const JointVector& inverse_weight,
+                                  double& expected) const noexcept {
+  const int n = static_cast<int>(q.size());
   Matrix6 a = Matrix6::Zero();
-  Row6 rest = point.residual;
+  Row6 rest = residual;
   for (int i = 0; i < n; ++i) {
     const Row6 column = columns.col(i);
     add_column(a, column, inverse_weight[i]);
@@ -180,7 +174,7 @@ JointVector Descent::step(const DescentPoint& point, double damping, const Joint
     for (int i = 0; i < n; ++i) {
       if ((fixed >> i & 1u) != 0) continue;
       const double ahead = wish != nullptr ? (*wish)[i] : 0.0;
-      next[i] = point.q[i] + ahead + inverse_weight[i] * columns.col(i).dot(y);
+      next[i] = q[i] + ahead + inverse_weight[i] * columns.col(i).dot(y);
       if (next[i] >= problem_.lower[i] && next[i] <= problem_.upper[i]) continue;
       beyond |= 1u << i;
       next[i] = next[i] < problem_.lower[i] ? problem_.lower[i] : problem_.upper[i];
@@ -194,7 +188,7 @@ JointVector Descent::step(const DescentPoint& point, double damping, const Joint
       if ((beyond >> i & 1u) == 0) continue;
       const Row6 column = columns.col(i);
       add_column(a, column, -inverse_weight[i]);
-      rest += ((wish != nullptr ? (*wish)[i] : 0.0) - (next[i] - point.q[i])) * column;
+      rest += ((wish != nullptr ? (*wish)[i] : 0.0) - (next[i] - q[i])) * column;
     }
   }
 }
@@ -236,9 +230,12 @@ bool Descent::run(DescentPoint& point, const Effort& effort) const noexcept {
     double expected;
     next.q = effort.curved ? curved_step(point, damping * point.cost, expected)
                            : step(point, damping * point.cost, nullptr, problem_.reach, expected);
-    evaluate(next);
+    if (effort.always_lower && std::abs(point.cost - expected) <= kNothing * point.cost) break;
+    // Joints that are fixed at limits on the way may leave a step that promises nothing, if the damping is small.
+    const bool hopeless = effort.always_lower && expected > point.cost;
+    if (!hopeless) evaluate(next);
     const double allowed = effort.always_lower ? point.cost : std::max({point.cost, earlier[0], earlier[1]});
-    if (next.cost < allowed) {
+    if (!hopeless && next.cost < allowed) {
       if (point.cost - next.cost > 0.75 * (point.cost - expected)) damping = std::max(0.2 * damping, kLeast);
       growth = kGrowth;
       earlier[0] = earlier[1];

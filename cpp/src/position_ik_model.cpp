@@ -23,6 +23,7 @@ using detail::require;
 using detail::StartOrder;
 
 constexpr Effort kLastDigits{8, 0.5, false, false};  // of a closed form's solution
+constexpr double kStrict = 1e3;                      // factor of rows that are held before the others
 constexpr double kRounding = 1e-6;                   // [rad] of a closed form's solution close to a singularity
 
 std::optional<AnalyticIk> closed_form(const Chain& chain) {
@@ -33,12 +34,46 @@ std::optional<AnalyticIk> closed_form(const Chain& chain) {
   }
 }
 
+// Whether the six errors are all that is asked for, so that a closed form has the solutions.
+bool pose_alone(const PositionIkOptions& options) {
+  const bool zero = std::all_of(options.ranges.begin(), options.ranges.end(),
+                                [](const auto& range) { return range[0] == 0.0 && range[1] == 0.0; });
+  return options.task.whole() && zero && !options.cone;
+}
+
+void check_ranges(const PositionIkOptions& options) {
+  for (std::size_t i = 0; i < 6; ++i) {
+    const auto [least, largest] = options.ranges[i];
+    require(least <= largest && least < detail::kInfinity && largest > -detail::kInfinity, "ranges[", i, "] = (", least,
+            ", ", largest, ") must be the least and the largest error allowed");
+  }
+}
+
+void check_cone(const PositionIkOptions& options) {
+  const ToolCone& cone = *options.cone;
+  require(cone.axis.allFinite() && cone.axis.norm() > 1e-6 && cone.axis.norm() < 1e6, "cone: the axis (", cone.axis[0],
+          ", ", cone.axis[1], ", ", cone.axis[2], ") must be a direction");
+  require(cone.angle >= 0.0 && cone.angle <= std::numbers::pi, "cone: the angle ", cone.angle, " must be from 0 to π");
+  const auto& mask = options.task.mask;
+  require(mask[3] && mask[4] && mask[5],
+          "a cone takes the place of the orientation's rows: the mask must have all three");
+  const auto& exact = options.exact;
+  require(exact[3] == exact[4] && exact[4] == exact[5],
+          "with a cone, the orientation's rows are exact or not together");
+  for (std::size_t i = 3; i < 6; ++i) {
+    require(options.ranges[i][0] == 0.0 && options.ranges[i][1] == 0.0,
+            "a cone takes the place of the orientation's rows: ranges[", i, "] must be 0");
+  }
+}
+
 PositionIkOptions checked(const PositionIkOptions& options) {
   for (const double tolerance : options.tolerance) {
     require(std::isfinite(tolerance) && tolerance > 0.0, "tolerance = (", options.tolerance[0], ", ",
             options.tolerance[1], ") must be finite and above 0");
   }
   options.task.validate();
+  check_ranges(options);
+  if (options.cone) check_cone(options);
   require(options.starts >= 1 && options.starts <= detail::StartTable::kEntries, "starts = ", options.starts,
           " must be from 1 to ", detail::StartTable::kEntries);
   return options;
@@ -67,36 +102,30 @@ JointVector half_of(const JointLimits& limits) {
 PositionIk::Model::Model(const Chain& arm, const PositionIkOptions& given)
     : chain(arm),
       options(checked(given)),
-      problem(arm, options.task, options.tolerance, true),
-      on_turn(arm, options.task, options.tolerance, false),
+      problem(arm, options, true),
+      on_turn(arm, options, false),
+      strict(arm, options, true, kStrict),
       middle(middle_of(arm.limits())),
       zero(JointVector::Zero(arm.dof()).cwiseMax(arm.limits().lower).cwiseMin(arm.limits().upper)),
       speed(speed_of(arm.limits())),
       half(half_of(arm.limits())),
       table(problem),
-      analytic(options.task.whole() ? closed_form(arm) : std::nullopt),
-      parallel(options.task.whole() ? detail::ParallelAxes::of(arm) : std::nullopt) {}
+      analytic(pose_alone(options) ? closed_form(arm) : std::nullopt),
+      parallel(pose_alone(options) ? detail::ParallelAxes::of(arm) : std::nullopt) {}
 
-// The distance to the nearest limit.
 double PositionIk::Model::margin(const JointVector& q) const noexcept {
   return std::min((q - chain.limits().lower).minCoeff(), (chain.limits().upper - q).minCoeff());
 }
 
-// The least singular value of the task's rows.
 double PositionIk::Model::least_sigma(const Descent& search, const JointVector& q) const noexcept {
   DescentPoint point;
   point.q = q;
   search.evaluate(point);
-  TaskJacobian rows = select_rows(options.task, point.state.tip.linear(), point.state.jacobian);
-  int linear = 0;
-  for (std::size_t i = 0; i < 3; ++i) linear += options.task.mask[i] ? 1 : 0;
-  rows.topRows(linear) /= problem.length;
   Spectrum spectrum;
-  spectrum.decompose(rows);
+  spectrum.decompose(problem.rows.jacobian(point.state.tip, point.state.jacobian));
   return spectrum.sigma(spectrum.size() - 1);
 }
 
-// The answer at a point, on the turns nearest to `near`.
 PositionIkResult PositionIk::Model::result(const Descent& search, DescentPoint& point, const JointVector& near,
                                            Clock::time_point start) const noexcept {
   problem.place(near, point.q);
@@ -104,28 +133,11 @@ PositionIkResult PositionIk::Model::result(const Descent& search, DescentPoint& 
   PositionIkResult out;
   out.q = point.q;
   out.status = search.reached(point) ? PositionIkStatus::Ok : PositionIkStatus::Unreachable;
-  const Eigen::Matrix3d rotation = point.state.tip.linear();
-  out.error = problem.whole ? point.error
-                            : expand_rows(options.task, rotation, select_rows(options.task, rotation, point.error));
+  out.error = search.counted(point);
   out.solve_time = std::chrono::duration<double>(Clock::now() - start).count();
   return out;
 }
 
-// Puts each joint on the turn nearest to the middle of its range. Returns whether the limits hold then; what rounding
-// takes beyond a limit is put onto the limit.
-bool PositionIk::Model::within(JointVector& q) const noexcept {
-  constexpr double kTurn = 2.0 * std::numbers::pi;
-  const JointLimits& limits = chain.limits();
-  for (int i = 0; i < q.size(); ++i) {
-    q[i] += kTurn * std::round((middle[i] - q[i]) / kTurn);
-    if (q[i] < limits.lower[i] - kRounding || q[i] > limits.upper[i] + kRounding) return false;
-    q[i] = std::clamp(q[i], limits.lower[i], limits.upper[i]);
-  }
-  return true;
-}
-
-// The solutions of a closed form inside the limits. Returns whether these are all; where two solutions are almost one
-// or a joint is free, there may be more.
 bool PositionIk::Model::closed_form_branches(const Descent& search, const Pose& pose, const JointVector* near,
                                              Branches& out) const noexcept {
   if (parallel) {
@@ -133,7 +145,7 @@ bool PositionIk::Model::closed_form_branches(const Descent& search, const Pose& 
     DescentPoint point;
     for (int i = 0; i < found.count; ++i) {
       point.q = found.q[static_cast<std::size_t>(i)];
-      if (within(point.q) && search.run(point, kLastDigits)) out.add(point.q);
+      if (problem.place(middle, point.q, kRounding) && search.run(point, kLastDigits)) out.add(point.q);
     }
     return out.count() > 0 && !found.singular;
   }
@@ -148,7 +160,6 @@ bool PositionIk::Model::closed_form_branches(const Descent& search, const Pose& 
   return out.count() > 0;
 }
 
-// The solutions that descents from the first entries of the table find.
 void PositionIk::Model::search_all(const Descent& search, const Pose& pose, int starts, Branches& out) const noexcept {
   StartOrder order(table, pose);
   DescentPoint point;

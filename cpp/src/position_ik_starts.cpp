@@ -39,7 +39,7 @@ int free_row(const Task& task, std::size_t first) {
 }  // namespace
 
 StartTable::StartTable(const DescentProblem& problem)
-    : task_(problem.task),
+    : rows_(problem.rows),
       length_(problem.length),
       configurations_(problem.chain.dof(), kEntries),
       features_(kEntries, kFeatures),
@@ -58,17 +58,20 @@ StartTable::StartTable(const DescentProblem& problem)
 // about which the task leaves the rotation free.
 StartTable::Features StartTable::features(const Pose& pose) const noexcept {
   Features out = Features::Zero();
-  const bool tool = task_.frame == Frame::Tool;
-  const bool all_positions = task_.mask[0] && task_.mask[1] && task_.mask[2];
+  const Task& task = rows_.task();
+  const bool tool = task.frame == Frame::Tool;
+  const bool all_positions = task.mask[0] && task.mask[1] && task.mask[2];
   for (int i = 0; i < 3; ++i) {
-    if (!task_.mask[static_cast<std::size_t>(i)] || (tool && !all_positions)) continue;
+    if (!task.mask[static_cast<std::size_t>(i)] || (tool && !all_positions)) continue;
     out[i] = static_cast<float>(pose.translation()[i] / length_);
   }
-  if (task_.mask[3] && task_.mask[4] && task_.mask[5]) {
+  if (const Eigen::Vector3d* const cone = rows_.cone_axis()) {
+    out.segment<3>(3) = (pose.linear() * *cone).cast<float>();
+  } else if (task.mask[3] && task.mask[4] && task.mask[5]) {
     const double part = std::sqrt(0.75);  // of |ΔR|² = 2 θ² in three columns, two have about 4/3 θ²
     out.segment<3>(3) = (part * pose.linear().col(0)).cast<float>();
     out.segment<3>(6) = (part * pose.linear().col(2)).cast<float>();
-  } else if (const int row = free_row(task_, 3); row >= 0) {
+  } else if (const int row = free_row(task, 3); row >= 0) {
     const Eigen::Vector3d axis = tool ? Eigen::Vector3d(pose.linear().col(row))
                                       : Eigen::Vector3d(pose.linear().row(row));
     out.segment<3>(3) = axis.cast<float>();

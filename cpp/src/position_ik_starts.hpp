@@ -31,7 +31,7 @@ class StartTable {
   using Features = Eigen::Matrix<float, kFeatures, 1>;
   Features features(const Pose& pose) const noexcept;
 
-  Task task_;
+  PoseRows rows_;
   double length_;
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic> configurations_;  // (n, kEntries)
   Eigen::Matrix<float, Eigen::Dynamic, kFeatures> features_;              // (kEntries, ·)

@@ -22,7 +22,8 @@ MatrixXd Random::orthonormal(int m, int k) {
 
 MatrixXd Random::with_singular_values(int m, int n, const VectorXd& sigma) {
   const int k = static_cast<int>(sigma.size());
-  return orthonormal(m, k) * sigma.asDiagonal() * orthonormal(n, k).transpose();
+  const MatrixXd right = orthonormal(n, k), left = orthonormal(m, k);
+  return left * sigma.asDiagonal() * right.transpose();
 }
 
 Eigen::Matrix3d Random::rotation() {
@@ -34,7 +35,7 @@ Eigen::Matrix3d Random::rotation() {
 sigmaik::Pose Random::pose(double size) {
   sigmaik::Pose p = sigmaik::Pose::Identity();
   p.linear() = rotation();
-  p.translation() = size * Eigen::Vector3d(uniform(-1, 1), uniform(-1, 1), uniform(-1, 1));
+  for (int i = 2; i >= 0; --i) p.translation()[i] = size * uniform(-1, 1);
   return p;
 }
 

@@ -494,14 +494,17 @@ TEST_CASE("far out of reach each shipped arm points at the target, and says that
 
 TEST_CASE("whole poses of an arm with few joints are unreachable, and no other configuration is nearer") {
   Random random(42);
-  for (int n = 1; n <= 5; ++n) {
+  for (int trial = 0; trial < 100; ++trial) {
+    const int n = 1 + trial % 5;
     const Chain chain = limited_chain(random, n, 0.2);
     const PositionIk ik(chain);
+    CAPTURE(trial);
     const double length = chain.characteristic_length();
     const auto distance = [&](const Twist& error) {
       return std::hypot(error.head<3>().norm() / length, error.tail<3>().norm());
     };
     for (int k = 0; k < 5; ++k) {
+      CAPTURE(k);
       const Pose target = random.pose();
       const PositionIkResult found = ik.solve(target);
       CHECK(found.status == PositionIkStatus::Unreachable);

@@ -6,7 +6,9 @@
 ///
 ///     E(q) = |e_p(q)/L|² + |e_o(q)|²   where   lower ≤ q ≤ upper
 ///
-/// over the rows of the task, where [e_p; e_o] is pose_error and L is the chain's characteristic length. The descent is
+/// over the rows of the task, where [e_p; e_o] is pose_error and L is the chain's characteristic length. Where errors
+/// are allowed (ranges, a cone), the distance from the allowed errors takes the place of the error: E is zero inside,
+/// and has a continuous gradient, as the allowed errors are convex sets. The descent is
 /// the method of Levenberg and Marquardt with a damping that is proportional to E (Sugihara, "Solvability-unconcerned
 /// inverse kinematics by the Levenberg–Marquardt method", IEEE Trans. Robotics 27(5), 2011):
 ///
@@ -29,12 +31,16 @@
 /// Machine Theory 209, 2025). The search follows only where none of these solutions is inside the limits.
 ///
 /// Close to a singularity, and out of reach, these descents are slow. The best of each block of starts therefore goes
-/// on with the second derivatives of the pose, which move the tip along a lost direction.
+/// on with the second derivatives of the pose, which move the tip along a lost direction. The nearest pose of one that
+/// is out of reach is a minimum of E by Newton's method. Rows that are held before the others have a larger weight in
+/// E, and are then met exactly by the method of multipliers (Rockafellar, "The multiplier method of Hestenes and Powell
+/// applied to convex programming", Journal of Optimization Theory and Applications 12(6), 1973).
 
 #include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include <sigmaik/chain.hpp>
@@ -52,17 +58,32 @@ class NearestSearch;
 bool follow_solution(const PositionIk& ik, const Pose& pose, JointVector& q) noexcept;
 }  // namespace detail
 
-/// Settings of a PositionIk.
+/// An axis of the tool that may point anywhere within an angle of its direction in the target pose. The turn about the
+/// axis is free.
+struct ToolCone {
+  Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();  ///< in tool axes, not zero
+  double angle = 0.0;                               ///< [rad] in [0, π]
+};
+
+/// Settings of a PositionIk. Arrays of six have an entry for each row (x, y, z, rotations about x, y, z), in the task's
+/// axes.
 struct PositionIkOptions {
-  std::array<double, 2> tolerance{1e-6, 1e-6};  ///< [m], [rad] > 0: largest errors of position and orientation
+  std::array<double, 2> tolerance{1e-6, 1e-6};  ///< [m], [rad] > 0: largest errors, beyond those allowed below
   Task task{};                                  ///< rows of the pose error that matter
-  int starts = 256;                             ///< in [1, 2048]: the most starts of a search
+  /// Of these, the rows that are held before the others: of a pose that is unreachable, the exact rows are met (where
+  /// they can be), and the others are as near as possible.
+  std::array<bool, 6> exact{};
+  /// [m, rad] least and largest error allowed, target minus tip, as in PositionIkResult::error; least ≤ largest, and
+  /// either may be infinite. An orientation's error is the rotation vector from tip to target.
+  std::array<std::array<double, 2>, 6> ranges{};
+  std::optional<ToolCone> cone{};  ///< in place of the rows of the orientation, which the task must ask for
+  int starts = 256;                ///< in [1, 2048]: the most starts of a search
 };
 
 /// Result of PositionIk.
 enum class PositionIkStatus : std::int8_t {
   Ok = 0,           ///< a solution, inside tolerance and limits
-  Unreachable = 1,  ///< none was found; q is the configuration with the smallest E that was found
+  Unreachable = 1,  ///< none was found; q is the nearest that was found: the smallest E, after that of the exact rows
   BadInput = 2,     ///< NaN, beyond 1e9 rad or m, not a rotation, or a wrong size
 };
 
@@ -73,8 +94,9 @@ const char* to_string(PositionIkStatus status) noexcept;
 struct PositionIkResult {
   JointVector q;                                         ///< (n,) [rad or m] inside the limits; empty after bad input
   PositionIkStatus status = PositionIkStatus::BadInput;  ///< what was found
-  Twist error =
-      Twist::Zero();        ///< pose_error from q to the target, base axes; zero in the rows that the task leaves out
+  /// pose_error from q to the target, base axes; zero in the rows that the task leaves out. With a cone, the
+  /// orientation part is the rotation by which the axis misses its direction.
+  Twist error = Twist::Zero();
   double solve_time = 0.0;  ///< [s]
 };
 
@@ -135,6 +157,6 @@ class PositionIk {
   std::shared_ptr<const Model> model_;
 };
 
-SIGMAIK_SAME_LAYOUT(PositionIk, PositionIkOptions, PositionIkResult, PositionIkBranch);
+SIGMAIK_SAME_LAYOUT(PositionIk, ToolCone, PositionIkOptions, PositionIkResult, PositionIkBranch);
 
 }  // namespace sigmaik
