@@ -41,6 +41,14 @@ bool pose_alone(const PositionIkOptions& options) {
   return options.task.whole() && zero && !options.cone;
 }
 
+// The exact rows, and no others.
+PositionIkOptions exact_alone(PositionIkOptions options) {
+  for (std::size_t i = 0; i < 6; ++i) options.task.mask[i] = options.task.mask[i] && options.exact[i];
+  if (!options.exact[3]) options.cone.reset();
+  options.exact = {};
+  return options;
+}
+
 void check_ranges(const PositionIkOptions& options) {
   for (std::size_t i = 0; i < 6; ++i) {
     const auto [least, largest] = options.ranges[i];
@@ -105,6 +113,7 @@ PositionIk::Model::Model(const Chain& arm, const PositionIkOptions& given)
       problem(arm, options, true),
       on_turn(arm, options, false),
       strict(arm, options, true, kStrict),
+      held(problem.rows.some_held() ? std::make_unique<const Model>(arm, exact_alone(options)) : nullptr),
       middle(middle_of(arm.limits())),
       zero(JointVector::Zero(arm.dof()).cwiseMax(arm.limits().lower).cwiseMin(arm.limits().upper)),
       speed(speed_of(arm.limits())),

@@ -2,6 +2,7 @@
 // What the searches of a PositionIk have in common.
 
 #include <chrono>
+#include <memory>
 #include <optional>
 
 #include <sigmaik/analytic_ik.hpp>
@@ -17,6 +18,7 @@ namespace detail {
 
 inline constexpr Effort kQuick{24, 0.5, false, false};  // of a start
 inline constexpr Effort kLong{80, 0.95, false, true};   // of the best start of a block
+inline constexpr Effort kPatient{80, 1.0, true, true};  // to the nearest pose
 inline constexpr double kLargest = 1e9;                 // of a position [rad or m]: above, rounding exceeds 1e-7
 
 }  // namespace detail
@@ -26,11 +28,12 @@ struct PositionIk::Model {
 
   Chain chain;
   PositionIkOptions options;
-  detail::DescentProblem problem;  // of a search for any solution
-  detail::DescentProblem on_turn;  // of a search near a configuration: every joint stays on its turn
-  detail::DescentProblem strict;   // `problem`, with a large weight of the rows that are held before the others
-  JointVector middle, zero;        // of the joint ranges; 0, or the limit nearest to 0
-  JointVector speed, half;         // velocity limits; half of the ranges, π or 1 m where there is none
+  detail::DescentProblem problem;     // of a search for any solution
+  detail::DescentProblem on_turn;     // of a search near a configuration: every joint stays on its turn
+  detail::DescentProblem strict;      // `problem`, with a large weight of the rows that are held before the others
+  std::unique_ptr<const Model> held;  // these rows alone; null: no row is held before others
+  JointVector middle, zero;           // of the joint ranges; 0, or the limit nearest to 0
+  JointVector speed, half;            // velocity limits; half of the ranges, π or 1 m where there is none
   detail::StartTable table;
   std::optional<AnalyticIk> analytic;
   std::optional<detail::ParallelAxes> parallel;

@@ -8,17 +8,14 @@ namespace sigmaik::detail {
 namespace {
 
 constexpr Effort kNear{60, 0.95, false, false};  // of the start from `near`
-constexpr Effort kPatient{80, 1.0, true, true};  // of a slice of the last descent, to the nearest pose
 constexpr int kPatience = 8;                     // slices of this
-constexpr int kHeldPatience = 12;                // slices of the method of multipliers
 constexpr int kBlock = 16;                       // starts
 constexpr int kSpread = 4;                       // after the first block, one of so many starts is far away
-constexpr int kNearStarts = 48;     // starts of the table with which a search near a configuration looks for branches
-constexpr int kPulled = 8;          // solutions of a redundant arm that are moved towards `near`
-constexpr int kPullSteps = 8;       // of a slice of this
-constexpr int kPulls = 5;           // slices
-constexpr double kSettled = 1e-11;  // [m, rad] errors of rows that are held, which are none
-constexpr double kSame = 1e-6;      // [rad, or L] solutions that differ by less are the same
+constexpr int kNearStarts = 48;  // starts of the table with which a search near a configuration looks for branches
+constexpr int kPulled = 8;       // solutions of a redundant arm that are moved towards `near`
+constexpr int kPullSteps = 8;    // of a slice of this
+constexpr int kPulls = 5;        // slices
+constexpr double kSame = 1e-6;   // [rad, or L] solutions that differ by less are the same
 
 }  // namespace
 
@@ -37,12 +34,7 @@ FirstSearch::FirstSearch(const FirstSearch& other, const Descent& descent) noexc
       found_(other.found_),
       best_(other.best_),
       best_of_block_(other.best_of_block_),
-      candidates_(other.candidates_),
-      costs_(other.costs_),
-      count_(other.count_),
-      settled_(other.settled_),
-      shift_(other.shift_),
-      settling_(other.settling_) {}
+      held_(other.held_) {}
 
 bool FirstSearch::end(bool found) noexcept {
   found_ = found;
@@ -52,58 +44,21 @@ bool FirstSearch::end(bool found) noexcept {
 
 bool FirstSearch::after_block() noexcept {
   if (best_of_block_.cost < best_.cost) best_ = best_of_block_;
-  if (descent_.problem().rows.some_held()) keep(best_of_block_);
+  if (model_.held) held_.add(best_of_block_);
   best_of_block_.cost = kInfinity;
   stage_ = starts_ < model_.options.starts ? Stage::Start : Stage::Patient;
   return false;
 }
 
-void FirstSearch::keep(const DescentPoint& point) noexcept {
-  int at = std::min(count_, kCandidates - 1);
-  if (count_ == kCandidates && point.cost >= costs_[kCandidates - 1]) return;
-  for (; at > 0 && point.cost < costs_[static_cast<std::size_t>(at - 1)]; --at) {
-    candidates_[static_cast<std::size_t>(at)] = candidates_[static_cast<std::size_t>(at - 1)];
-    costs_[static_cast<std::size_t>(at)] = costs_[static_cast<std::size_t>(at - 1)];
-  }
-  candidates_[static_cast<std::size_t>(at)] = point.q;
-  costs_[static_cast<std::size_t>(at)] = point.cost;
-  count_ = std::min(count_ + 1, kCandidates);
-}
-
 // To a minimum of E.
 bool FirstSearch::patient() noexcept {
+  if (model_.held) {  // in one slice: a servo's guide, which needs slices, has no such rows
+    best_ = held_.nearest(model_, descent_);
+    return end(descent_.reached(best_));
+  }
   const double before = best_.cost;
   if (descent_.run(best_, kPatient)) return end(true);
   return ++patience_ == kPatience || !(best_.cost < before) ? end(false) : false;
-}
-
-// Rows that are held come first, and then the others.
-bool FirstSearch::nearer(const DescentPoint& one, const DescentPoint& other) const noexcept {
-  const PoseRows& rows = descent_.problem().rows;
-  const bool met = descent_.reached_held(one);
-  if (met != descent_.reached_held(other)) return met;
-  if (met) return one.cost < other.cost;
-  return rows.weighted(rows.held(one.rows)).squaredNorm() < rows.weighted(rows.held(other.rows)).squaredNorm();
-}
-
-// The method of multipliers, of one candidate after the other: each slice takes the errors that are left in the rows
-// that are held into the shift, and leaves about a millionth of them.
-bool FirstSearch::settle() noexcept {
-  if (patience_ == 0) {
-    settling_.q = candidates_[static_cast<std::size_t>(settled_)];
-    shift_.setZero();
-  }
-  const Descent descent(model_.strict, descent_.target(), shift_);
-  descent.run(settling_, kPatient);
-  const Row6 shift = model_.strict.rows.held(settling_.rows);
-  const bool still = (shift - shift_).cwiseAbs().maxCoeff() <= kSettled;
-  shift_ = shift;
-  if (++patience_ < kHeldPatience && !still) return false;
-  patience_ = 0;
-  descent_.evaluate(settling_);
-  if (settled_ == 0 || nearer(settling_, best_)) best_ = settling_;
-  if (descent_.reached(best_)) return end(true);
-  return ++settled_ == count_ ? end(false) : false;
 }
 
 bool FirstSearch::advance() noexcept {
@@ -126,7 +81,7 @@ bool FirstSearch::advance() noexcept {
       if (!descent_.run(best_of_block_, kLong)) return after_block();
       best_ = best_of_block_;
       return end(true);
-    case Stage::Patient: return descent_.problem().rows.some_held() ? settle() : patient();
+    case Stage::Patient: return patient();
     case Stage::Ended: break;
   }
   return true;

@@ -4,6 +4,7 @@
 
 #include <optional>
 
+#include "position_ik_held.hpp"
 #include "position_ik_model.hpp"
 
 namespace sigmaik::detail {
@@ -28,10 +29,7 @@ class FirstSearch {
   enum class Stage : std::int8_t { Start, Longer, Patient, Ended };
   bool end(bool found) noexcept;
   bool after_block() noexcept;
-  void keep(const DescentPoint& point) noexcept;
   bool patient() noexcept;
-  bool settle() noexcept;
-  bool nearer(const DescentPoint& one, const DescentPoint& other) const noexcept;
 
   const PositionIk::Model& model_;
   const Descent& descent_;
@@ -40,13 +38,7 @@ class FirstSearch {
   int starts_ = 0, patience_ = 0;
   bool found_ = false;
   DescentPoint best_, best_of_block_;
-  // Of rows that are held before the others: the best of each block, the smallest E first, until they are settled.
-  static constexpr int kCandidates = 6;
-  std::array<JointVector, kCandidates> candidates_;
-  std::array<double, kCandidates> costs_{};
-  int count_ = 0, settled_ = 0;
-  Row6 shift_ = Row6::Zero();
-  DescentPoint settling_;
+  HeldSearch held_;  // where rows are held before the others: the best of each block
 };
 
 // Follows a solution of one pose to another pose that is near. Returns whether `q` is a solution now; otherwise `q` is

@@ -54,6 +54,7 @@ class PositionIk;
 
 namespace detail {
 class FirstSearch;
+class HeldSearch;
 class NearestSearch;
 bool follow_solution(const PositionIk& ik, const Pose& pose, JointVector& q) noexcept;
 }  // namespace detail
@@ -151,6 +152,7 @@ class PositionIk {
 
  private:
   friend class detail::FirstSearch;
+  friend class detail::HeldSearch;
   friend class detail::NearestSearch;
   friend bool detail::follow_solution(const PositionIk& ik, const Pose& pose, JointVector& q) noexcept;
   struct Model;
