@@ -156,6 +156,10 @@ def main() -> int:
     ]
     subprocess.run(command, check=True)
     result["time_optimal"] = json.loads((out / "time_optimal.json").read_text())
+    print("\nposition inverse kinematics", flush=True)
+    command = [sys.executable, ROOT / "bench" / "position_ik_peers.py", "--poses", "300", "--json", out / "ik.json"]
+    subprocess.run(command, check=True)
+    result["position_ik"] = json.loads((out / "ik.json").read_text())
     result["instructions"] = instructions(ROOT / "build" / "callgrind")
 
     def cpu(name: str) -> float:

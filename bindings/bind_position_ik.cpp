@@ -21,13 +21,68 @@ struct Argument<std::array<double, 2>> {
   static py::object to(const std::array<double, 2>& value) { return py::make_tuple(value[0], value[1]); }
 };
 
+/// Least and largest error of each row, (6, 2), or half the width of each range, (6,). Infinite is allowed.
+template <>
+struct Argument<std::array<std::array<double, 2>, 6>> {
+  using Ranges = std::array<std::array<double, 2>, 6>;
+  static constexpr bool kNone = true;
+  static std::string type() { return "numpy.typing.ArrayLike | None"; }
+  static std::string text(const Ranges&) { return "None"; }
+  static Ranges from(py::handle object, const char* what) {
+    const Array array = Array::ensure(object);
+    if (!array) PyErr_Clear();
+    const bool pairs = array && array.ndim() == 2 && array.shape(0) == 6 && array.shape(1) == 2;
+    if (!pairs && !(array && array.ndim() == 1 && array.shape(0) == 6)) {
+      throw Error(std::string(what) + " must have shape (6,): half widths, or (6, 2): least and largest errors");
+    }
+    Ranges out{};
+    for (std::size_t i = 0; i < 6; ++i) {
+      out[i][0] = pairs ? array.data()[2 * i] : -array.data()[i];
+      out[i][1] = pairs ? array.data()[2 * i + 1] : array.data()[i];
+    }
+    return out;
+  }
+  static py::object to(const Ranges& value) {
+    py::array_t<double> out({6, 2});
+    for (std::size_t i = 0; i < 6; ++i) std::copy(value[i].begin(), value[i].end(), out.mutable_data() + 2 * i);
+    return out;
+  }
+};
+
+/// An axis and an angle, such as ((0, 0, 1), 0.2).
+template <>
+struct Argument<ToolCone> {
+  static constexpr bool kNone = false;
+  static std::string type() { return "tuple[numpy.typing.ArrayLike, float]"; }
+  static ToolCone from(py::handle object, const char* what) {
+    if (!py::isinstance<py::sequence>(object) || py::len(object) != 2) {
+      throw Error(std::string(what) + " must be a pair: an axis (3,) and an angle [rad]");
+    }
+    const auto pair = py::reinterpret_borrow<py::sequence>(object);
+    const Array axis = array_argument(py::object(pair[0]), "the axis of the cone", {3}, "(3,)");
+    return {Eigen::Vector3d(Eigen::Map<const Eigen::Vector3d>(axis.data())),
+            Argument<double>::from(py::object(pair[1]), "the angle of the cone")};
+  }
+  static py::object to(const ToolCone& value) { return py::make_tuple(to_numpy(value.axis), value.angle); }
+};
+
 template <>
 struct Fields<PositionIkOptions> {
   static constexpr std::tuple all{
       field("tolerance", &PositionIkOptions::tolerance,
-            "(2,) [m], [rad] > 0: the largest errors of position and orientation that a solution may have; most "
-            "solutions are exact to rounding."),
+            "(2,) [m], [rad] > 0: the largest errors of position and orientation that a solution may have, beyond "
+            "those that `ranges` and `cone` allow; most solutions are exact to rounding."),
       nested(&PositionIkOptions::task),
+      field("exact", &PositionIkOptions::exact,
+            "(6,) truth values: the rows that are held before the others. Of a pose that is unreachable, these are met "
+            "where they can be, and the others are as near as possible."),
+      field(
+          "ranges", &PositionIkOptions::ranges,
+          "(6, 2) [m, rad]: the least and the largest error allowed in each row (target minus tip, as `error` has it), "
+          "in the axes of `frame`; or (6,) ≥ 0, half the width of each range. Infinite is allowed. None: no error."),
+      field("cone", &PositionIkOptions::cone,
+            "(axis, angle): an axis (3,) of the tool that may point anywhere within `angle` [rad] of its direction in "
+            "the target pose, free to turn about itself; in place of the rows of the orientation."),
       field("starts", &PositionIkOptions::starts,
             "1 to 2048, the most starts of a search. A pose out of reach takes all of them."),
   };
@@ -38,7 +93,7 @@ namespace {
 void bind_answers(py::module_& m) {
   py::native_enum<PositionIkStatus>(m, "PositionIkStatus", "enum.IntEnum", "What a PositionIk found.")
       .value("OK", PositionIkStatus::Ok, "a solution, inside tolerance and limits")
-      .value("UNREACHABLE", PositionIkStatus::Unreachable, "none; q is the nearest that was found")
+      .value("UNREACHABLE", PositionIkStatus::Unreachable, "none; q is the nearest found, in the exact rows first")
       .value("BAD_INPUT", PositionIkStatus::BadInput, "in C++ alone; Python raises")
       .finalize();
   py::class_<PositionIkResult>(m, "PositionIkResult", "Answer of PositionIk.solve().")
@@ -49,7 +104,9 @@ void bind_answers(py::module_& m) {
       .def_readonly("status", &PositionIkResult::status, "See PositionIkStatus.")
       .def_property_readonly(
           "error", [](const PositionIkResult& r) { return to_numpy(r.error); },
-          "(6,) [m, rad] pose_error from q to the target, base axes; zero in the rows that the task leaves out.")
+          "(6,) [m, rad] pose_error from q to the target, base axes; zero in the rows that the task leaves out. With "
+          "a\n"
+          "cone, the orientation part is the rotation by which the axis misses its direction.")
       .def_readonly("solve_time", &PositionIkResult::solve_time, "[s]")
       .def("__repr__", [](const PositionIkResult& r) {
         return record("PositionIkResult", {{"q", to_numpy(r.q)},

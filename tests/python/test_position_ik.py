@@ -144,7 +144,69 @@ def test_a_mask_leaves_rows_free(ur10):
         assert np.linalg.norm(tip[:3, 2] - target[:3, 2]) < 1.1e-6
 
 
+def test_errors_inside_ranges_are_allowed(ur10):
+    ranges = (0, 0, 0.01, np.radians(5), 0, 0)  # ±10 mm in z, ±5° about x
+    ik = sk.PositionIk(ur10, ranges=ranges)
+    rng = np.random.default_rng(8)
+    used = 0
+    for q in sample(ur10, rng, 30):
+        target = ur10.pose(q)
+        r = ik.solve(target, near=sample(ur10, rng))
+        assert r.status == sk.PositionIkStatus.OK
+        assert inside(ur10, r.q)
+        assert np.all(np.abs(r.error) <= np.array(ranges) + 1.001e-6)
+        used += np.linalg.norm(r.error) > 1e-3
+    assert used > 20  # the nearest solution makes use of the ranges
+
+
+def test_ranges_may_be_one_sided(ur10):
+    ranges = np.zeros((6, 2))
+    ranges[2] = -0.05, 0.0  # target minus tip: the tip may be above the target
+    ik = sk.PositionIk(ur10, ranges=ranges)
+    rng = np.random.default_rng(9)
+    for q in sample(ur10, rng, 30):
+        target = ur10.pose(q)
+        r = ik.solve(target, near=sample(ur10, rng))
+        assert r.status == sk.PositionIkStatus.OK
+        assert -1e-6 < ur10.pose(r.q)[2, 3] - target[2, 3] < 0.05 + 1e-6
+
+
+def test_a_cone_lets_an_axis_tilt_and_turn(ur10):
+    ik = sk.PositionIk(ur10, cone=((0, 0, 1), 0.3))
+    rng = np.random.default_rng(10)
+    for q in sample(ur10, rng, 30):
+        target = ur10.pose(q)
+        r = ik.solve(target, near=sample(ur10, rng))
+        tip = ur10.pose(r.q)
+        assert r.status == sk.PositionIkStatus.OK
+        assert np.linalg.norm(tip[:3, 3] - target[:3, 3]) < 1.001e-6
+        assert np.arccos(np.clip(tip[:3, 2] @ target[:3, 2], -1, 1)) < 0.3 + 1e-6
+
+
+def test_exact_rows_are_met_where_the_whole_pose_is_out_of_reach():
+    segments = sk.robots.load("ur10").segments[:-2]  # without the last axis
+    arm = sk.Chain("base", [s for s in segments])
+    ik = sk.PositionIk(arm, exact=(1, 1, 1, 0, 0, 0))
+    either = sk.PositionIk(arm)
+    rng = np.random.default_rng(11)
+    far = 0
+    for q in sample(arm, rng, 20):
+        target = arm.pose(q)
+        target[:3, :3] = sk.rotation_exp(rng.normal(size=3)) @ target[:3, :3]
+        r = ik.solve(target)
+        assert inside(arm, r.q)
+        assert np.linalg.norm(r.error[:3]) < 1.001e-6
+        far += np.linalg.norm(either.solve(target).error[:3]) > 1e-3
+    assert far > 10  # without `exact`, position and orientation share the error
+
+
 def test_options_are_given_back(ur10):
+    both = sk.PositionIk(ur10, exact=(1, 1, 1, 0, 0, 0), ranges=(0.1, 0, np.inf, 0, 0, 0), cone=((0, 1, 0), 0.2))
+    options = sk.PositionIk(ur10, **both.options).options
+    assert list(options["exact"]) == [True] * 3 + [False] * 3
+    np.testing.assert_array_equal(options["ranges"][:3], [[-0.1, 0.1], [0, 0], [-np.inf, np.inf]])
+    np.testing.assert_array_equal(options["cone"][0], [0, 1, 0])
+    assert options["cone"][1] == 0.2
     ik = sk.PositionIk(ur10, (1e-4, 1e-3), mask=(1, 1, 1, 0, 0, 0), starts=20)
     again = sk.PositionIk(ur10, **ik.options)
     assert again.options["tolerance"] == (1e-4, 1e-3)
@@ -162,6 +224,16 @@ def test_what_is_refused(ur10):
         sk.PositionIk(ur10, starts=0)
     with pytest.raises(sk.Error, match="no row"):
         sk.PositionIk(ur10, mask=(0, 0, 0, 0, 0, 0))
+    with pytest.raises(sk.Error, match=r"ranges must have shape \(6,\)"):
+        sk.PositionIk(ur10, ranges=(0.1, 0.1))
+    with pytest.raises(sk.Error, match=r"ranges\[1\]"):
+        sk.PositionIk(ur10, ranges=(0, -0.1, 0, 0, 0, 0))
+    with pytest.raises(sk.Error, match="cone must be a pair"):
+        sk.PositionIk(ur10, cone=0.2)
+    with pytest.raises(sk.Error, match="axis of the cone has shape"):
+        sk.PositionIk(ur10, cone=((0, 1), 0.2))
+    with pytest.raises(sk.Error, match="angle"):
+        sk.PositionIk(ur10, cone=((0, 0, 1), 4.0))
     ik = sk.PositionIk(ur10)
     good = ur10.pose(np.full(6, 0.3))
     bad = good.copy()
