@@ -2,9 +2,11 @@
 
 Each arm gets random configurations, evenly within its position limits, and every solver the poses of these, one after
 the other, from the same start (the middle of the limits). An answer counts where the arm's kinematics say that it is
-within the tolerance in each row, inside the limits, and came within the time allowed. Solvers take turns, pose by pose,
-so that a machine that changes its speed does so for all. A peer that has used up its time on an arm gets no more poses
-there; the table then says how many it had.
+within the tolerance in each row, inside the limits, and took no more than 5 ms of each thread. Times are the process's
+CPU time, so that other work on the machine matters little; TRAC-IK has two threads, whose times add up. Solvers take
+turns, pose by pose, so that a machine that changes its speed does so for all. A solver that has used up its time on an
+arm gets no more poses there; the table then says how many it had. Two peers stop by the clock on the wall: on a busy
+machine give them more with --patience, and their answers still have to come within 5 ms of CPU time to count.
 """
 
 from __future__ import annotations
@@ -15,6 +17,7 @@ import importlib.metadata
 import json
 import tempfile
 import time
+import warnings
 import xml.etree.ElementTree as ET
 from collections.abc import Callable
 from pathlib import Path
@@ -25,7 +28,8 @@ import numpy as np
 import sigmaik as sk
 
 TOLERANCE = 1e-5  # m and rad, in each row
-ALLOWED = 5e-3  # s
+ALLOWED = 5e-3  # s of CPU time, of each thread
+THREADS = {"TRAC-IK": 2}
 
 # Foreign arms: package, file, tip
 FOREIGN = [
@@ -79,8 +83,8 @@ def bare_urdf(source: Path, tip: str, out: Path) -> str:
 
 
 class Arm:
-    def __init__(self, name: str, source: Path, tip: str, folder: Path) -> None:
-        self.name, self.tip = name, tip
+    def __init__(self, name: str, source: Path, tip: str, folder: Path, patience: float = ALLOWED) -> None:
+        self.name, self.tip, self.patience = name, tip, patience
         self.urdf = folder / f"{name}.urdf"
         self.base = bare_urdf(source, tip, self.urdf)
         self.chain = sk.Chain.from_urdf(self.urdf, self.base, tip)
@@ -114,7 +118,9 @@ def optik(arm: Arm) -> Solve:
     peer = importlib.import_module("optik")
     robot = peer.Robot.from_urdf_file(str(arm.urdf), arm.base, arm.tip)
     robot.set_parallelism(1)  # as all others here
-    config = peer.SolverConfig(solution_mode="speed", max_time=ALLOWED, max_restarts=10**6, tol_f=0.5 * TOLERANCE**2)
+    config = peer.SolverConfig(
+        solution_mode="speed", max_time=arm.patience, max_restarts=10**6, tol_f=0.5 * TOLERANCE**2
+    )
     start = arm.start.tolist()
 
     def solve(pose: np.ndarray) -> Any:
@@ -127,7 +133,7 @@ def optik(arm: Arm) -> Solve:
 def trac_ik(arm: Arm) -> Solve:
     peer = importlib.import_module("pytracik")
     solver = peer.TRAC_IK(
-        arm.base, arm.tip, arm.urdf.read_text(), ALLOWED, TOLERANCE, peer.SolveType.Speed
+        arm.base, arm.tip, arm.urdf.read_text(), arm.patience, TOLERANCE, peer.SolveType.Speed
     )  # two threads, as TRAC-IK is
 
     def solve(pose: np.ndarray) -> Any:
@@ -151,7 +157,7 @@ def toolbox(arm: Arm) -> Solve:
 
     def solve(pose: np.ndarray) -> Any:
         found = ets.ik_LM(pose, q0=arm.start, tol=0.5 * TOLERANCE**2, joint_limits=True)
-        return found[0] if found[1] else None
+        return found.q if found.success else None
 
     return solve
 
@@ -196,12 +202,12 @@ def measure(arm: Arm, poses: int, budget: float, seed: int) -> list[dict[str, An
         for name, solve in solvers.items():
             if spent[name] > budget:
                 continue
-            start = time.perf_counter()
+            start = time.process_time()
             answer = solve(pose)
-            taken = time.perf_counter() - start
+            taken = time.process_time() - start
             times[name].append(taken)
             spent[name] += taken
-            solved[name] += taken <= 1.2 * ALLOWED and arm.solved(answer, pose)
+            solved[name] += taken <= THREADS.get(name, 1) * ALLOWED and arm.solved(answer, pose)
     for name, values in times.items():
         us = 1e6 * np.asarray(values)
         rows.append(
@@ -223,17 +229,22 @@ def main() -> None:
     parser.add_argument("--poses", type=int, default=10000, help="of each arm (%(default)s)")
     parser.add_argument("--budget", type=float, default=60.0, help="[s] of a solver on an arm (%(default)s)")
     parser.add_argument("--arms", nargs="*", help="names (all)")
+    parser.add_argument(
+        "--patience", type=float, default=ALLOWED, help="[s] on the wall, of optik and TRAC-IK (%(default)s)"
+    )
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--json", help="write the figures to this file")
     arguments = parser.parse_args()
     sources = {name: (Path(sk.robots.path(name)), "flange") for name in sk.robots.names()} | foreign()
+    warnings.simplefilter("ignore")  # of the peers
     rows = []
     print(f"{'arm':30} {'solver':14} {'poses':>6} {'solved %':>9} {'mean µs':>9} {'p99 µs':>9}")
     with tempfile.TemporaryDirectory() as folder:
         for name, (source, tip) in sources.items():
             if arguments.arms and name not in arguments.arms:
                 continue
-            for row in measure(Arm(name, source, tip, Path(folder)), arguments.poses, arguments.budget, arguments.seed):
+            arm = Arm(name, source, tip, Path(folder), arguments.patience)
+            for row in measure(arm, arguments.poses, arguments.budget, arguments.seed):
                 rows.append(row)
                 if "skipped" in row:
                     print(f"{name:30} {row['solver']:14} skipped: {row['skipped']}", flush=True)

@@ -1588,7 +1588,8 @@ class PositionIkResult:
     @property
     def error(self) -> numpy.typing.NDArray[numpy.float64]:
         """
-        (6,) [m, rad] pose_error from q to the target, base axes; zero in the rows that the task leaves out.
+        (6,) [m, rad] pose_error from q to the target, base axes; zero in the rows that the task leaves out. With a
+        cone, the orientation part is the rotation by which the axis misses its direction.
         """
     @property
     def q(self) -> numpy.typing.NDArray[numpy.float64]:
@@ -1640,12 +1641,20 @@ class PositionIk:
     Universal Robots' arms have, are solved in closed form. The same call gives the same answer. Immutable, safe to
     share.
     """
-    def __init__(self, chain: Chain, tolerance: numpy.typing.ArrayLike = (1e-06, 1e-06), *, mask: numpy.typing.ArrayLike | None = (1, 1, 1, 1, 1, 1), frame: typing.Literal['base', 'tool'] = 'base', starts: typing.SupportsInt | typing.SupportsIndex = 256) -> None:
+    def __init__(self, chain: Chain, tolerance: numpy.typing.ArrayLike = (1e-06, 1e-06), *, mask: numpy.typing.ArrayLike | None = (1, 1, 1, 1, 1, 1), frame: typing.Literal['base', 'tool'] = 'base', exact: numpy.typing.ArrayLike | None = (0, 0, 0, 0, 0, 0), ranges: numpy.typing.ArrayLike | None = None, cone: tuple[numpy.typing.ArrayLike, float] | None = None, starts: typing.SupportsInt | typing.SupportsIndex = 256) -> None:
         """
         tolerance: (2,) [m], [rad] > 0: the largest errors of position and orientation that a solution may
-            have; most solutions are exact to rounding.
+            have, beyond those that `ranges` and `cone` allow; most solutions are exact to rounding.
         mask: (6,) truth values: the rows (vx, vy, vz, ωx, ωy, ωz) that matter; None: all.
         frame: the axes of these rows, the base's or the tool's.
+        exact: (6,) truth values: the rows that are held before the others. Of a pose that is unreachable,
+            these are met where they can be, and the others are as near as possible.
+        ranges: (6, 2) [m, rad]: the least and the largest error allowed in each row (target minus tip, as
+            `error` has it), in the axes of `frame`; or (6,) ≥ 0, half the width of each range. Infinite is
+            allowed. None: no error.
+        cone: (axis, angle): an axis (3,) of the tool that may point anywhere within `angle` [rad] of its
+            direction in the target pose, free to turn about itself; in place of the rows of the
+            orientation.
         starts: 1 to 2048, the most starts of a search. A pose out of reach takes all of them.
         """
     def __repr__(self) -> str:
