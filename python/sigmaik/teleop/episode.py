@@ -15,10 +15,12 @@ configuration's number to its settings) and version.
 
 A recording as a parquet file (extra `viewer`) has a row for each cycle, and columns for tools of imitation learning:
 
-    timestamp [s] from 0, frame_index, episode_index, observation.state (n,) q, observation.velocity (n,) q̇,
+    timestamp [s] of the loop's clock from 0 (late cycles show as gaps), frame_index, episode_index, observation.state (n,) q, observation.velocity (n,) q̇,
     action (6,) the twist that was asked for [v; ω], pose (16,) the tip's, row by row, command, status, guide (text)
 
-with the same meta in the schema's metadata.
+with the same meta in the schema's metadata, and joint_names, gaps (their number) and gap_seconds (their sum).
+
+A recording that goes on is a file `.part`, written by `sigmaik.teleop.journal`; `Episode.load` reads such a file, too.
 """
 
 from __future__ import annotations
@@ -26,9 +28,7 @@ from __future__ import annotations
 import dataclasses
 import enum
 import json
-import math
 import pathlib
-import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, BinaryIO
@@ -41,19 +41,17 @@ from sigmaik._extras import need
 from sigmaik._types import Array
 from sigmaik.files import write_atomically
 
+from .archive import MAGIC, largest_unpacked, read_npz, read_parts
+from .checks import check_motion, check_samples, fit_samples, sample_dtype
 from .settings import Settings
 
-__all__ = ["Arm", "Episode"]
+__all__ = ["Arm", "Episode", "Gap"]
 Samples = NDArray[np.void]
 
 _LIMITS = ("lower", "upper", "velocity", "acceleration")
-#: Fields that older recordings do not have, with type, shape of a row, and value there.
-_LATER: dict[str, tuple[str, tuple[int, ...], float]] = {
-    "singular_directions": ("<f8", (6, 6), math.nan),
-    "state": ("i1", (), -1),
-    "guide": ("i1", (), int(sk.GuideState.OFF)),
-    "guide_joints": ("<u2", (), 0),
-}
+_NOTES = {*_LIMITS, "before", "joint_names", "home", "urdf", "meta"}
+#: [cycles] A longer time between two cycles is a gap.
+_GAP = 1.5
 
 
 @dataclass(frozen=True)
@@ -64,6 +62,15 @@ class Arm:
     urdf: str  #: text
     chain: sk.Chain  #: with the limits that the servo kept
     home: Array  #: (n,) the posture [rad or m]
+
+
+@dataclass(frozen=True)
+class Gap:
+    """Time without a cycle."""
+
+    row: int  #: of the first cycle after the gap
+    seconds: float  #: [s] beyond one cycle
+    lost: int  #: cycles that ran and were not recorded; 0: the loop left cycles out
 
 
 @dataclass(frozen=True)
@@ -86,8 +93,20 @@ class Episode:
 
     @property
     def duration(self) -> float:
-        """[s] of the arm's time."""
-        return len(self) * self.dt
+        """[s] of the loop's clock, from the first cycle to the end of the last."""
+        time = self["time"]
+        return float(time[-1] - time[0]) + self.dt if len(self) else 0.0
+
+    @property
+    def gaps(self) -> list[Gap]:
+        """Where the loop's clock went on by more than 1.5 cycles from one cycle to the next, or cycles are missing."""
+        time, cycle = np.diff(self["time"]), np.diff(self["cycle"])
+        rows = np.flatnonzero((time > _GAP * self.dt) | (cycle != 1))
+        return [Gap(int(k) + 1, float(time[k]) - self.dt, int(cycle[k]) - 1) for k in rows]
+
+    def check(self) -> None:
+        """Error where the recording can be neither judged nor drawn nor replayed, with the field and the row."""
+        check_samples(self.samples, self.dt, self.settings, self.arm.home, self.before)
 
     @property
     def runs(self) -> list[slice]:
@@ -100,7 +119,9 @@ class Episode:
         """The number of joints times cycles beyond a limit by more than rounding, while limits were on.
 
         The keys are position, velocity and acceleration. The first cycles after a start outside the limits count, too.
+        Error where limits cannot be judged: no cycle, NaN, dt ≤ 0, a configuration without settings.
         """
+        check_motion(self.samples, self.dt, self.settings)
         limits = self.arm.chain.limits
         settings = [self.settings[number] for number in self["configuration"].tolist()]
         on = np.array([s.limits for s in settings], dtype=bool)
@@ -120,15 +141,16 @@ class Episode:
     def play(self) -> Array:
         """(N, n) the positions that a fresh servo commands for the same commands, cycle by cycle.
 
-        On the machine that made the recording these positions equal the recorded positions, to the bit. ValueError
-        where cycles are missing.
+        On the machine that made the recording these positions equal the recorded positions, to the bit. Error
+        where cycles are missing, or the recording is malformed.
         """
+        self.check()
         out = np.empty_like(self["q"])
         servo: sk.Servo | None = None
         active, next_cycle = -1, int(self["cycle"][0])
         for k, sample in enumerate(self.samples):
             if sample["cycle"] != next_cycle:
-                raise ValueError(f"cycles {next_cycle} to {sample['cycle'] - 1} are missing")
+                raise sk.Error(f"cycles {next_cycle} to {sample['cycle'] - 1} are missing")
             next_cycle += 1
             number = int(sample["configuration"])
             if number != active:
@@ -163,14 +185,24 @@ class Episode:
         return write_atomically(pathlib.Path(file), lambda stream: self._parquet(stream, episode_index))
 
     @staticmethod
-    def load(file: str | pathlib.Path) -> Episode:
-        """Reads an npz file. ValueError where it is no recording."""
+    def load(file: str | pathlib.Path, largest: int | None = None) -> Episode:
+        """Reads an npz file, or the file of a recording that was cut off (`.part`).
+
+        largest: [bytes] to which an npz file may unpack; None: 200 times its size, and 64 MiB in any case.
+        Error where the file is no recording, is malformed or unpacks to more, with the reason. OSError where the file
+        cannot be read.
+        """
         path = pathlib.Path(file)
         try:
-            with np.load(path, allow_pickle=False) as data:
-                return _episode(data)
-        except (KeyError, ValueError, TypeError, EOFError, zipfile.BadZipFile, AttributeError) as error:
-            raise ValueError(f"{path}: not a recording of sigmaik: {' '.join(str(error).split())}") from None
+            with path.open("rb") as stream:
+                cut_off = stream.read(len(MAGIC)) == MAGIC
+            episode = _from_parts(path) if cut_off else _from_npz(path, largest)
+            episode.check()
+            return episode
+        except (OSError, MemoryError):
+            raise
+        except Exception as error:  # a hostile file makes zipfile, json and numpy raise nearly anything
+            raise sk.Error(f"{path}: not a recording of sigmaik: {' '.join(str(error).split())}") from None
 
     def _meta(self) -> str:
         return json.dumps(
@@ -189,15 +221,19 @@ class Episode:
         limits = self.arm.chain.limits
         arrays: dict[str, Any] = {name: self.samples[name] for name in self.samples.dtype.names}
         arrays |= {name: getattr(limits, name) for name in _LIMITS}
-        np.savez_compressed(
-            stream,
-            **arrays,
-            before=np.stack(self.before),
-            joint_names=np.array(self.arm.chain.joint_names),
-            home=self.arm.home,
-            urdf=np.array(self.arm.urdf),
-            meta=np.array(self._meta()),
-        )
+        arrays |= {
+            "before": np.stack(self.before),
+            "joint_names": np.array(self.arm.chain.joint_names),
+            "home": self.arm.home,
+            "urdf": np.array(self.arm.urdf),
+            "meta": np.array(self._meta()),
+        }
+        np.savez_compressed(stream, **arrays)
+        # `load` refuses what is packed more densely.
+        if sum(np.asarray(a).nbytes for a in arrays.values()) > 0.9 * largest_unpacked(stream.tell()):
+            stream.seek(0)
+            stream.truncate()
+            np.savez(stream, **arrays)
 
     def _parquet(self, stream: BinaryIO, episode_index: int) -> None:
         import pyarrow as pa
@@ -214,7 +250,7 @@ class Episode:
 
         table = pa.table(
             {
-                "timestamp": pa.array((self["cycle"] - self["cycle"][0]) * self.dt),
+                "timestamp": pa.array(self["time"] - self["time"][0]),
                 "frame_index": pa.array(np.arange(n, dtype=np.int64)),
                 "episode_index": pa.array(np.full(n, episode_index, dtype=np.int64)),
                 "observation.state": vectors(self["q"]),
@@ -226,28 +262,55 @@ class Episode:
                 "guide": texts("guide", sk.GuideState),
             }
         )
-        meta = {"sigmaik": self._meta(), "joint_names": json.dumps(list(self.arm.chain.joint_names))}
+        gaps = self.gaps
+        meta = {
+            "sigmaik": self._meta(),
+            "joint_names": json.dumps(list(self.arm.chain.joint_names)),
+            "gaps": str(len(gaps)),
+            "gap_seconds": repr(sum(gap.seconds for gap in gaps)),
+        }
         parquet.write_table(table.replace_schema_metadata(meta), stream)
 
 
-def _episode(data: Any) -> Episode:
+def _from_npz(path: pathlib.Path, largest: int | None) -> Episode:
+    names = set(sample_dtype(sk.robots.load("ur10")).names or ())  # the same for every arm
+    data = read_npz(path, names | _NOTES, largest)
+    missing = sorted(_NOTES - data.keys())
+    if missing:
+        raise sk.Error(f"it has no {', '.join(missing)}")
     meta = json.loads(str(data["meta"]))
-    chain = sk.Chain.from_urdf(str(data["urdf"]), base=meta["base"], tip=meta["tip"])
-    chain = chain.with_limits(**{name: data[name] for name in _LIMITS})
+    limits = {name: data[name] for name in _LIMITS}
+    arm = _arm(meta, str(data["urdf"]), data["joint_names"].tolist(), limits, data["home"])
+    arrays = {name: values for name, values in data.items() if name in names}
+    return _episode(arm, meta, fit_samples(arrays, arm.chain), data["before"])
+
+
+def _from_parts(path: pathlib.Path) -> Episode:
+    notes, chunks = read_parts(path)
+    limits = {name: np.array(notes["limits"][name], dtype=np.float64) for name in _LIMITS}
+    arm = _arm(notes, notes["urdf"], notes["joint_names"], limits, np.array(notes["home"], dtype=np.float64))
+    samples = np.concatenate(chunks)
+    arrays = {name: samples[name] for name in samples.dtype.names or ()}
+    if not arrays:
+        raise sk.Error("its samples have no fields")
+    return _episode(arm, notes, fit_samples(arrays, arm.chain), np.array(notes["before"], dtype=np.float64))
+
+
+def _arm(meta: Mapping[str, Any], urdf: str, joints: list[str], limits: dict[str, Array], home: Array) -> Arm:
+    if not urdf.lstrip().startswith("<"):
+        raise sk.Error("urdf is not the text of a URDF")  # a path would be opened
+    chain = sk.Chain.from_urdf(urdf, base=meta["base"], tip=meta["tip"]).with_limits(**limits)
+    if tuple(joints) != tuple(chain.joint_names):
+        raise sk.Error(f"joint_names are not those of its URDF, {', '.join(chain.joint_names)}")
+    return Arm(str(meta["robot"]), urdf, chain, home)
+
+
+def _episode(arm: Arm, meta: Mapping[str, Any], samples: Samples, before: Array) -> Episode:
     # A recording that says nothing of a guide is older than the guide: its servo had none.
     settings = {
         int(number): Settings(**{"guided": False, **values, "mask": tuple(values["mask"])})
         for number, values in meta["settings"].items()
     }
-    skip = {*_LIMITS, "before", "joint_names", "home", "urdf", "meta"}
-    arrays = {name: data[name] for name in data.files if name not in skip}
-    for name, (dtype, shape, empty) in _LATER.items():
-        if name not in arrays:
-            arrays[name] = np.full((len(arrays["cycle"]), *shape), empty, dtype)
-    fields = [(name, values.dtype, values.shape[1:]) for name, values in arrays.items()]
-    samples = np.empty(len(arrays["cycle"]), fields)
-    for name, values in arrays.items():
-        samples[name] = values
-    before = data["before"]
-    arm = Arm(meta["robot"], str(data["urdf"]), chain, data["home"])
+    if before.shape != (2, arm.chain.dof):
+        raise sk.Error(f"before has shape {before.shape}, not {(2, arm.chain.dof)}")
     return Episode(samples, arm, float(meta["dt"]), settings, (before[0], before[1]))

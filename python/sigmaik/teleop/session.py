@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
+import pathlib
 import threading
 from typing import Any
 
@@ -13,6 +15,7 @@ import sigmaik as sk
 from sigmaik._types import Array
 
 from .episode import Arm, Episode
+from .journal import Journal
 from .settings import Settings
 from .target import TargetPose
 
@@ -28,6 +31,9 @@ class Session:
 
     Commands go stale: the arm stops within its limits unless the command is repeated in time. `refresh` repeats a pose;
     the code that watches over the commander calls `refresh` while the commander is alive.
+
+    A stop is latched: after `stop` every command is refused until `release`. A session that is left and entered again
+    does not move before a new command.
     """
 
     def __init__(
@@ -72,31 +78,47 @@ class Session:
         servo.reset(self.home)
         self._loop = sk.ServoLoop(servo, history=_power_of_two(2.0 * rate))
         self._goal: Array | None = None
+        self._stopped = ""
+        self._why_it_holds = "no command yet"
         self._lock = threading.RLock()
         self._latest: Samples | None = None
         self._recorded: list[Samples] | None = None
+        self._recording_ended = False
+        self._journal: Journal | None = None
         self._recorded_cycles = 0
         self._from = 0  # number of the configuration with which the recording begins
         self._before: tuple[Array, Array] | None = None  # q and q̇ before the recording
         self._history: dict[int, Settings] = {0: self._settings}
 
     def __enter__(self) -> Session:
-        self._loop.start()
-        return self
+        with self._lock:
+            self._hold("no command yet")  # a command of the last run may still be fresh
+            self._loop.start()
+            return self
 
     def __exit__(self, *_: object) -> None:
-        with self._lock:
-            self._goal = None  # a session that is entered again does not move before a new command
+        self.hold("the session has ended")
         self._loop.stop()
+        with self._lock:
+            self.read()
+            self._hold("the session has ended")  # what another thread commanded meanwhile
+            if self._recorded is not None:
+                self._recording_ended = True
+            if self._journal is not None:
+                self._journal.close()
 
     # --- commands
 
     def follow(self, target: ArrayLike | TargetPose) -> None:
-        """Drives the tip to a pose (4, 4) in base. ValueError if the target is no pose, or more than 100 m away."""
+        """Drives the tip to a pose (4, 4) in base. Error if the target is no pose, or more than 100 m away.
+
+        Error while the session is stopped.
+        """
         pose = TargetPose.of(target).matrix
         with self._lock:
+            self._refuse_if_stopped()
             self._loop.follow(pose, self.pose_timeout)
-            self._goal = pose
+            self._goal, self._why_it_holds = pose, "the target was not repeated in time"
 
     def refresh(self) -> None:
         """Repeats the pose that the arm follows, so that the pose does not go stale."""
@@ -105,24 +127,62 @@ class Session:
                 self._loop.follow(self._goal, self.pose_timeout)
 
     def twist(self, twist: ArrayLike) -> None:
-        """Moves the tip along [v; ω] (6,) [m/s, rad/s], base axes, for `twist_timeout`."""
+        """Moves the tip along [v; ω] (6,) [m/s, rad/s], base axes, for `twist_timeout`. Error while stopped."""
         with self._lock:
+            self._refuse_if_stopped()
             self._loop.follow_twist(twist, self.twist_timeout)
-            self._goal = None
+            self._goal, self._why_it_holds = None, "the twist was not repeated"
 
-    def hold(self) -> None:
-        """Stops as fast as the limits allow."""
+    def hold(self, why: str = "told to hold") -> None:
+        """Stops as fast as the limits allow. The next command moves the arm again; `stop` is latched.
+
+        why: for people, see `why_it_holds`
+        """
         with self._lock:
-            self._goal = None
-            self._loop.hold()
+            self._hold(why)
+
+    def _hold(self, why: str) -> None:
+        self._goal, self._why_it_holds = None, why
+        self._loop.hold()
+
+    def stop(self, why: str = "Stop was pressed") -> None:
+        """Stops as fast as the limits allow, and refuses every command until `release`."""
+        with self._lock:
+            self._stopped = why
+            self._hold(why)
+
+    def release(self) -> None:
+        """Ends a stop. The arm holds until the next command."""
+        with self._lock:
+            if self._stopped:
+                self._stopped = ""
+                self._hold("the stop was released; no command yet")
+
+    @property
+    def stopped(self) -> str:
+        """Why the session is stopped; empty while commands are taken."""
+        return self._stopped
+
+    @property
+    def why_it_holds(self) -> str:
+        """Why the arm holds, where it holds."""
+        return self._stopped or self._why_it_holds
+
+    def _refuse_if_stopped(self) -> None:
+        if self._stopped:
+            raise sk.Error(f"stopped ({self._stopped}): release the stop first")
 
     def restart(self, q: ArrayLike | None = None) -> None:
-        """Puts the (simulated) arm at q (n,), by default where it started, and ends a recording's run of cycles."""
+        """Puts the (simulated) arm at q (n,), by default where it started, and ends a recording's run of cycles.
+
+        Error while stopped.
+        """
         with self._lock:
-            self.hold()
+            self._refuse_if_stopped()
+            self._hold("put back; no command yet")
             servo = self._settings.servo(self.chain, self._dt, self.home)
             servo.reset(self.home if q is None else q)
-            self._history[self._loop.configure(servo, restart=True)] = self._settings
+            self._remember(self._loop.configure(servo, restart=True), self._settings)
 
     @property
     def goal(self) -> Array | None:
@@ -140,9 +200,14 @@ class Session:
         with self._lock:
             settings = self._settings.with_(**changes)
             servo = settings.servo(self.chain, self._dt, self.home)
-            self._history[self._loop.configure(servo)] = settings
+            self._remember(self._loop.configure(servo), settings)
             self._settings = settings
             self._length_scale = servo.length_scale
+
+    def _remember(self, number: int, settings: Settings) -> None:
+        self._history[number] = settings
+        if self._journal is not None:
+            self._journal.note(settings={str(number): dataclasses.asdict(settings)})
 
     @property
     def length_scale(self) -> float:
@@ -155,7 +220,7 @@ class Session:
         """(N,) the samples since the last call, see `ServoLoop.read`. Recordings are made here: call `read` often."""
         with self._lock:
             samples: Samples = self._loop.read()
-            if self._recorded is not None:
+            if self._recorded is not None and not self._recording_ended:
                 self._record(samples)
             if len(samples):
                 self._latest = samples[-1:].copy()
@@ -168,10 +233,18 @@ class Session:
             return
         if not self._recorded:
             before = samples[first - 1] if first > 0 else self.latest
-            self._before = (before["q"].copy(), before["qdot"].copy()) if before is not None else None
+            if before is not None:
+                self._before = (before["q"].copy(), before["qdot"].copy())
+            else:
+                start = samples[first]
+                self._before = (start["q"] - self._dt * start["qdot"], np.zeros(self.chain.dof))
+            if self._journal is not None:
+                self._journal.note(before=np.stack(self._before).tolist())
         kept = samples[first : first + self.longest_recording - self._recorded_cycles]
         self._recorded.append(kept)
         self._recorded_cycles += len(kept)
+        if self._journal is not None:
+            self._journal.append(kept)
 
     @property
     def latest(self) -> Any:
@@ -204,39 +277,71 @@ class Session:
         """Whether the recording has reached its longest."""
         return self.recorded >= self.longest_recording
 
-    def start_recording(self) -> None:
-        """Records from the next cycle on. ValueError where a recording already runs."""
+    @property
+    def recording_trouble(self) -> str:
+        """Why the file of the recording is not written any more; the recording goes on in memory."""
+        return self._journal.trouble if self._journal is not None else ""
+
+    def start_recording(self, file: str | pathlib.Path | None = None) -> None:
+        """Records from the next cycle on, in memory.
+
+        file: a new file `.part` that has the recording as far as it goes, whatever ends the program, and that
+        `Episode.load` reads; by default none. The caller removes the file once the episode is saved. Error where the
+        file exists or a recording already runs, OSError where the file cannot be written.
+        """
         with self._lock:
             if self._recorded is not None:
-                raise ValueError("it is recording already")
+                raise sk.Error("it is recording already")
             self.read()
+            self._journal = None if file is None else Journal(file, self._note())
             # The recording begins with a fresh servo, so that a replay gives the same bits.
             servo = self._settings.servo(self.chain, self._dt, self.home)
             self._from = self._loop.configure(servo)
-            self._history[self._from] = self._settings
-            self._recorded, self._recorded_cycles = [], 0
+            self._remember(self._from, self._settings)
+            self._recorded, self._recorded_cycles, self._recording_ended = [], 0, False
 
     def stop_recording(self) -> Episode:
-        """Ends the recording and returns it. ValueError where no cycle was recorded."""
+        """Ends the recording and returns it. Error where no cycle was recorded."""
         with self._lock:
             if self._recorded is None:
-                raise ValueError("it is not recording")
+                raise sk.Error("it is not recording")
             self.read()
             recorded, self._recorded = self._recorded, None
             cycles, self._recorded_cycles = self._recorded_cycles, 0
+            journal, self._journal = self._journal, None
+            if journal is not None:
+                journal.close() if cycles else journal.discard()
             if cycles == 0:
-                raise ValueError("no cycle was recorded")
+                raise sk.Error("no cycle was recorded")
+            assert self._before is not None
             samples: Samples = np.concatenate(recorded)
-            start = samples[0]
-            before = self._before or (start["q"] - self._dt * start["qdot"], np.zeros(self.chain.dof))
             used = set(np.unique(samples["configuration"]).tolist())
             return Episode(
                 samples,
-                Arm(self.name, self.source.read_text(encoding="utf-8"), self.chain, self.home),
+                Arm(self.name, self._urdf(), self.chain, self.home),
                 self._dt,
                 {number: s for number, s in self._history.items() if number in used},
-                before,
+                self._before,
             )
+
+    def _urdf(self) -> str:
+        return self.source.read_text(encoding="utf-8")
+
+    def _note(self) -> dict[str, Any]:
+        """What the file of a recording says before its first cycle."""
+        limits = self.chain.limits
+        return {
+            "robot": self.name,
+            "base": self.chain.base,
+            "tip": self.chain.tip,
+            "dt": self._dt,
+            "urdf": self._urdf(),
+            "joint_names": list(self.chain.joint_names),
+            "limits": {name: getattr(limits, name).tolist() for name in ("lower", "upper", "velocity", "acceleration")},
+            "home": self.home.tolist(),
+            "settings": {},
+            "version": sk.__version__,
+        }
 
 
 def _power_of_two(least: float) -> int:
