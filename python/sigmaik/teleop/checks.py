@@ -94,8 +94,8 @@ def check_samples(
     for name in ("pose", "target"):
         _require_poses(samples[name], name)
     dof = samples["q"].shape[1]
-    for name, values in (("home", home), *zip(("before", "before"), before, strict=True)):
-        if np.shape(values) != (dof,) or not np.isfinite(values).all():
+    for name, joints in (("home", home), ("before", before[0]), ("before", before[1])):
+        if np.shape(joints) != (dof,) or not np.isfinite(joints).all():
             raise sk.Error(f"{name} must be {dof} finite numbers")
     if np.isinf(samples["singular_values"]).any() or (samples["singular_values"] < 0.0).any():
         raise sk.Error("singular_values has a number that is infinite or negative")

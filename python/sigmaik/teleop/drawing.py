@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-import functools
 import io
 import math
 import pathlib
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 import sigmaik as sk
 from sigmaik._types import Array
+
+from .meshes import MeshFiles
 
 if TYPE_CHECKING:
     import viser
@@ -23,14 +25,25 @@ __all__ = ["RobotView", "drawable"]
 class RobotView:
     """An arm in viser's scene."""
 
-    def __init__(self, server: viser.ViserServer, source: pathlib.Path, chain: sk.Chain, name: str = "/arm") -> None:
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        source: pathlib.Path,
+        chain: sk.Chain,
+        packages: Mapping[str, str | pathlib.Path] | None = None,
+        name: str = "/arm",
+    ) -> None:
+        """packages: name to folder of further packages that may have meshes. Error where a mesh is elsewhere."""
         import yourdfpy
         from viser import transforms
         from viser.extras import ViserUrdf
 
-        handler = functools.partial(yourdfpy.filename_handler_magic, dir=source.parent)
+        handler = MeshFiles(source, packages)
         text, self.missing = drawable(source.read_text(encoding="utf-8"), handler)
-        urdf = yourdfpy.URDF.load(io.BytesIO(text.encode()), filename_handler=handler, load_collision_meshes=False)
+        try:
+            urdf = yourdfpy.URDF.load(io.BytesIO(text.encode()), filename_handler=handler, load_collision_meshes=False)
+        except Exception as error:  # readers of meshes raise nearly anything
+            raise sk.Error(f"{source} cannot be drawn: {type(error).__name__}: {error}") from None
         # The axes of the scene are those of the chain's base, which can differ from the root of the URDF.
         root = np.linalg.inv(np.asarray(urdf.get_transform(chain.base)))
         server.scene.add_frame(

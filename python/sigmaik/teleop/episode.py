@@ -15,8 +15,9 @@ configuration's number to its settings) and version.
 
 A recording as a parquet file (extra `viewer`) has a row for each cycle, and columns for tools of imitation learning:
 
-    timestamp [s] of the loop's clock from 0 (late cycles show as gaps), frame_index, episode_index, observation.state (n,) q, observation.velocity (n,) q̇,
-    action (6,) the twist that was asked for [v; ω], pose (16,) the tip's, row by row, command, status, guide (text)
+    timestamp [s] of the loop's clock from 0 (late cycles show as gaps), frame_index, episode_index,
+    observation.state (n,) q, observation.velocity (n,) q̇, action (6,) the twist that was asked for [v; ω],
+    pose (16,) the tip's, row by row, command, status, guide (text)
 
 with the same meta in the schema's metadata, and joint_names, gaps (their number) and gap_seconds (their sum).
 

@@ -11,7 +11,7 @@ import numpy as np
 import sigmaik as sk
 from sigmaik._types import Array
 
-__all__ = ["guide_words", "joint_bars", "singular_bars", "status_text"]
+__all__ = ["guide_words", "joint_bars", "legend", "printable", "singular_bars", "status_text"]
 
 _GREEN, _AMBER, _RED, _GREY, _TRACK = "#2f9e44", "#e8890c", "#d6336c", "#868e96", "#e9ecef"
 _COLOURS = {
@@ -38,22 +38,37 @@ _FONT = "font:12px/1.5 ui-monospace,monospace;padding:2px 12px"
 
 
 def status_text(
-    sample: Any, chain: sk.Chain, method: str, statistics: sk.LoopStatistics, rate: float, replaying: str = ""
+    sample: Any,
+    chain: sk.Chain,
+    method: str,
+    statistics: sk.LoopStatistics,
+    rate: float,
+    replaying: str = "",
+    *,
+    why: str = "",
+    driver: str = "",
 ) -> str:
-    """Status, the joints that limit, what the guide does, asked and achieved twist, and the servo's rate."""
+    """Status, limiting joints, what the guide does, place and twist of the tool, the servo's rate, who drives.
+
+    why: the arm holds, where it holds
+    """
     status, command = sk.Status(int(sample["status"])), sk.LoopCommand(int(sample["command"]))
     word = _WORDS.get(status, status.name.lower().replace("_", " "))
     if command is sk.LoopCommand.STALE:
-        word = "holding: the last command is stale"
+        word = f"holding: {why or 'the last command is stale'}"
+    elif command is sk.LoopCommand.HOLD and why:
+        word = f"holding: {why}"
     if replaying:
         word = f"replaying {replaying}: {word}"
     joints = [name for i, name in enumerate(chain.joint_names) if int(sample["limiting_joints"]) >> i & 1]
     rows = [
         f"<div id='sk-status' data-status='{status.name}' data-command='{command.name}' "
-        f"style='font-size:15px;font-weight:600;color:{_COLOURS.get(status, _GREY)}'>{html.escape(word)}</div>",
+        f"style='font-size:15px;font-weight:600;color:{_COLOURS.get(status, _GREY)}'>{_safe(word)}</div>",
         f"<div>{html.escape(method)}{' · at limits: ' + html.escape(', '.join(joints)) if joints else ''}</div>",
         _guide_text(sk.GuideState(int(sample["guide"])), int(sample["guide_joints"])),
     ]
+    x, y, z = sample["pose"][:3, 3].tolist()
+    rows.append(f"<div style='white-space:pre'>{'tool':<9}{x:.3f} {y:.3f} {z:.3f} m</div>")
     for label, field in (("asked", "asked_twist"), ("achieved", "achieved_twist")):
         v = sample[field]
         size = f"{np.linalg.norm(v[:3]):.3f} m/s {np.linalg.norm(v[3:]):.3f} rad/s"
@@ -63,7 +78,44 @@ def status_text(
         f"<div style='white-space:pre'>{'left':<9}{left}   servo <span id='sk-rate'>{statistics.rate:.0f}</span> of "
         f"{rate:.0f} Hz</div>"
     )
+    if driver:
+        rows.append(f"<div style='white-space:pre'>{'driver':<9}<span id='sk-driver'>{_safe(driver)}</span></div>")
     return f"<div style='{_FONT}'>{''.join(rows)}</div>"
+
+
+def printable(text: str) -> str:
+    """Text that can be sent: characters that UTF-8 cannot encode (lone surrogates of file names) become �."""
+    return text.encode("utf-8", "replace").decode()
+
+
+def _safe(text: str) -> str:
+    return html.escape(printable(text))
+
+
+def legend() -> str:
+    """What the colours mean."""
+    entries = (
+        (_GREEN, "as asked"),
+        (_AMBER, "damped, or near a limit"),
+        (_RED, "held back by limits"),
+        (_GREY, "holding"),
+        ("#228be6", "arrow: asked velocity"),
+        (_GREEN, "arrow: achieved"),
+        (_RED, "line: singular, linear"),
+        ("#9735d6", "line: singular, angular"),
+        (_RED, "bar: σ below the threshold"),
+        ("#74c0fc", "ellipsoid: speeds of the tool"),
+    )
+    rows = "".join(
+        f"<div style='display:flex;gap:5px;align-items:center'><span style='flex:none;width:9px;height:9px;"
+        f"border-radius:2px;background:{colour}'></span><span>{words}</span></div>"
+        for colour, words in entries
+    )
+    grid = "display:grid;grid-template-columns:repeat(auto-fit,minmax(150px,1fr));column-gap:8px;font-size:11px"
+    return (
+        f"<details id='sk-legend' open style='{_FONT}'><summary>colours</summary>"
+        f"<div style='{grid}'>{rows}</div></details>"
+    )
 
 
 def guide_words(state: sk.GuideState, joints: int) -> str:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import collections
+import pathlib
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -54,13 +56,19 @@ def task_singular_values(jacobian: Array, rotation: Array, settings: Settings, l
 class Scene:
     """The handles of the drawn objects."""
 
-    def __init__(self, server: viser.ViserServer, session: Session) -> None:
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        session: Session,
+        packages: Mapping[str, str | pathlib.Path] | None = None,
+    ) -> None:
         scene = server.scene
         self.reach = _reach(session.chain)
-        server.initial_camera.position = tuple(self.reach * np.array([1.0, -1.75, 1.0]))
-        server.initial_camera.look_at = tuple(self.reach * np.array([0.55, 0.15, 0.25]))
+        # Near enough for the arm to be large; aimed to its right, where the panel covers the picture.
+        server.initial_camera.position = tuple(self.reach * np.array([0.8, -1.2, 0.75]))
+        server.initial_camera.look_at = tuple(self.reach * np.array([0.42, 0.05, 0.3]))
         scene.add_grid("/ground", 3.0 * self.reach, 3.0 * self.reach, cell_size=0.2, section_size=0.6)
-        self.robot = RobotView(server, session.source, session.chain)
+        self.robot = RobotView(server, session.source, session.chain, packages)
         self.target = scene.add_transform_controls("/target", scale=0.22 * self.reach, depth_test=False, line_width=3.0)
         self.tool = scene.add_frame("/tool", axes_length=0.08 * self.reach, axes_radius=0.006 * self.reach)
         self.ellipsoid = scene.add_icosphere(

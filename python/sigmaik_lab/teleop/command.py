@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import pathlib
+import signal
 import webbrowser
+from collections.abc import Iterator
+from typing import NoReturn
 
 from sigmaik._extras import need
 from sigmaik.teleop.devices import DEVICES
@@ -36,9 +40,19 @@ def options(parser: argparse.ArgumentParser) -> None:
     page.add_argument(
         "--host",
         default="127.0.0.1",
-        help="address to listen on (%(default)s: this machine only); anyone who reaches the address can drive the arm",
+        help="address to listen on (%(default)s: this machine only); anyone who has the printed address can drive",
     )
-    page.add_argument("--port", type=int, default=8080, help="(%(default)s)")
+    page.add_argument("--port", type=int, default=8080, help="(%(default)s; 0: a free one)")
+    page.add_argument(
+        "--name", action="append", default=[], metavar="HOST", help="a further name under which browsers reach the page"
+    )
+    page.add_argument(
+        "--package",
+        action="append",
+        default=[],
+        metavar="NAME=DIR",
+        help="a ROS package that the URDF's meshes may come from (besides the URDF's own folder and package)",
+    )
     page.add_argument("--open", action="store_true", help="open the page in the default browser")
     page.add_argument("--device", choices=tuple(DEVICES), help="drives the arm while its dead man's button is held")
     page.add_argument(
@@ -77,6 +91,7 @@ def run(args: argparse.Namespace) -> int:
         length_scale=args.length_scale,
         assumed_acceleration=args.acceleration,
     )
+    packages = dict(_package(text) for text in args.package)
     replay = None if args.replay is None else Episode.load(args.replay)
     session = Session(
         args.robot,
@@ -86,8 +101,10 @@ def run(args: argparse.Namespace) -> int:
         rate=args.rate,
         pose_timeout=args.browser_timeout,
     )
-    with session:
-        page = Page(session, args.host, args.port, args.out, not args.no_parquet)
+    with _signals_interrupt(), session:
+        page = Page(
+            session, args.host, args.port, args.out, not args.no_parquet, packages=packages, names=tuple(args.name)
+        )
         try:
             if args.device is not None:
                 say(f"driving by {page.open_device(args.device)}")
@@ -95,7 +112,7 @@ def run(args: argparse.Namespace) -> int:
                 page.replay(replay, args.replay.name)
             say(f"{page.url}  drives {session.name}; Ctrl-C ends it")
             if args.host not in ("127.0.0.1", "localhost", "::1"):
-                say(f"everybody who reaches {args.host} can drive it")
+                say(f"everybody who knows this address and reaches {args.host} can drive it")
             if args.open:
                 webbrowser.open(page.url)
             page.wait(args.seconds)
@@ -104,3 +121,29 @@ def run(args: argparse.Namespace) -> int:
     statistics = session.statistics
     say(f"{statistics.cycles} cycles at {statistics.rate:.0f} of {session.rate:.0f} Hz, {statistics.missed} left out")
     return 0
+
+
+def _package(text: str) -> tuple[str, pathlib.Path]:
+    name, equals, folder = text.partition("=")
+    if not (name and equals and folder):
+        raise ValueError(f"--package must be NAME=DIR, not '{text}'")
+    return name, pathlib.Path(folder)
+
+
+@contextlib.contextmanager
+def _signals_interrupt() -> Iterator[None]:
+    """SIGTERM and SIGHUP end the program as Ctrl-C does, so that a recording is saved; nohup's SIGHUP stays ignored."""
+    before = {}
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        with contextlib.suppress(ValueError):  # not in the main thread
+            if signal.getsignal(number) is not signal.SIG_IGN:
+                before[number] = signal.signal(number, _interrupt)
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _interrupt(*_: object) -> NoReturn:
+    raise KeyboardInterrupt
