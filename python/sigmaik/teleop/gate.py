@@ -39,9 +39,12 @@ _HEADERS = {
 }
 #: On a phone viser's panel covers the right of the picture; here it takes the lower half, and the picture the upper.
 _PHONE = b"""<style>@media (max-width: 36em) {
-  .mantine-Paper-root[style*="position: fixed"][style*="width: 20em"] { width: 100% !important; max-height: 50% !important }
-  .mantine-Paper-root div[style*="width: 20em"] { width: 100% !important }
-  div[style*="overflow: hidden"][style*="flex-grow: 1"][style*="height: 100%"] { height: 50% !important }
+  .mantine-Paper-root[style*="position: fixed"][style*="width: 20em"] {
+    width: 100% !important;
+    max-height: 50% !important;
+  }
+  .mantine-Paper-root div[style*="width: 20em"] { width: 100% !important; }
+  div[style*="overflow: hidden"][style*="flex-grow: 1"][style*="height: 100%"] { height: 50% !important; }
 }</style></head>"""
 _PATCHING = threading.Lock()
 
@@ -93,7 +96,7 @@ class Gate:
             if reason:
                 return _response(http.HTTPStatus.FORBIDDEN, reason)
             request.path = request.path[1 + len(self.token) :] or "/"
-            del headers["Accept-Encoding"]
+            headers.pop("Accept-Encoding", None)
             response = inner(connection, request)
             if response is not None:
                 if response.headers.get("Content-Type", "").startswith("text/html"):

@@ -36,17 +36,17 @@ class MeshFiles:
         if own is not None:
             self._packages.setdefault(*own)
 
-    def __call__(self, name: str) -> str:
-        file = self._place(name)
+    def __call__(self, fname: str) -> str:  # yourdfpy names the argument
+        file = self._place(fname)
         resolved = file.resolve()  # what links lead to counts
         roots = (self._folder, *self._packages.values())
         if not any(resolved.is_relative_to(root) for root in roots):
             raise Error(
-                f"the mesh {_shown(name)} is outside {', '.join(map(str, roots))}; "
+                f"the mesh {_shown(fname)} is outside {', '.join(map(str, roots))}; "
                 "declare the package that has it (--package NAME=FOLDER)"
             )
         if resolved.suffix.lower() not in _SUFFIXES:
-            raise Error(f"the mesh {_shown(name)} is none of {', '.join(sorted(_SUFFIXES))}")
+            raise Error(f"the mesh {_shown(fname)} is none of {', '.join(sorted(_SUFFIXES))}")
         return str(resolved)
 
     def _place(self, name: str) -> pathlib.Path:

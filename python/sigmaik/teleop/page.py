@@ -312,7 +312,7 @@ class Page:
                 self._hold(text)
                 if self._troubles.get(what) != text:
                     self._troubles[what] = text
-                    _log.exception("%s; the arm holds", what)
+                    _log.exception("%s; the arm holds", text)
                     with contextlib.suppress(Exception):
                         self._say_to_all("the arm holds", text)
             due = max(due + period, time.monotonic())

@@ -90,6 +90,8 @@ class Recorder:
         with self._lock:
             saved = []
             folder = self.directory if directory is None else pathlib.Path(directory)
+            if not folder.is_dir():
+                raise Error(f"there is no folder {folder}")
             while self._unsaved:
                 waiting = self._unsaved[0]
                 file = folder / waiting.name
@@ -160,5 +162,5 @@ def summary(file: pathlib.Path, episode: Episode) -> str:
     except Error as error:
         broken = f"limits cannot be judged: {error}"
     gaps = episode.gaps
-    missing = f", {len(gaps)} gaps of {sum(gap.seconds for gap in gaps):.2f} s" if gaps else ""
+    missing = f", {len(gaps)} gaps of {sum(gap.seconds for gap in gaps):.3f} s" if gaps else ""
     return f"{file.name}: {len(episode)} cycles, {episode.duration:.1f} s{missing}, {broken}"
