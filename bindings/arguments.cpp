@@ -150,6 +150,21 @@ Batch batch_argument(py::handle object, int n) {
           many};
 }
 
+std::string text_argument(py::handle object, const char* what) {
+  Py_ssize_t size = 0;
+  const char* const text = PyUnicode_AsUTF8AndSize(object.ptr(), &size);
+  if (text != nullptr) return {text, static_cast<std::size_t>(size)};
+  PyErr_Clear();
+  throw Error(std::string(what) + " " +
+              py::str(py::module_::import("builtins").attr("ascii")(object)).cast<std::string>() +
+              " has a character that UTF-8 cannot encode (a lone surrogate)");
+}
+
+std::string source_argument(const py::object& object) {
+  const py::object source = py::module_::import("os").attr("fspath")(object);
+  return py::isinstance<py::str>(source) ? text_argument(source, "source") : source.cast<std::string>();
+}
+
 Task task_argument(py::handle mask, const std::string& frame) {
   Task task;
   if (!mask.is_none()) task.mask = rows_argument(mask, "mask");

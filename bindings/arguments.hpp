@@ -38,6 +38,18 @@ inline py::object object_of(const MaybeArray& array) { return array ? py::object
 /// "(6, 7)".
 std::string shape_text(const py::array& array);
 
+/// The text of a str. Throws where UTF-8 cannot encode a character: Python's texts can hold lone surrogates.
+std::string text_argument(py::handle object, const char* what);
+
+/// The path, or the text, that a str or an os.PathLike holds.
+std::string source_argument(const py::object& object);
+
+/// An argument that is a str, without lone surrogates.
+struct Text {
+  std::string value;
+  operator const std::string&() const noexcept { return value; }
+};
+
 /// Throws unless every entry is finite.
 void require_finite(const Array& array, const char* what);
 
@@ -174,3 +186,18 @@ struct pybind11::detail::type_caster<sigmaik::Method> {
     return sigmaik::bindings::method_to_python(method).release();
   }
 };
+
+namespace pybind11::detail {
+
+template <>
+struct type_caster<sigmaik::bindings::Text> {
+  PYBIND11_TYPE_CASTER(sigmaik::bindings::Text, const_name("str"));
+
+  bool load(handle object, bool /*convert*/) {
+    if (!isinstance<str>(object)) return false;
+    value.value = sigmaik::bindings::text_argument(object, "the text");
+    return true;
+  }
+};
+
+}  // namespace pybind11::detail

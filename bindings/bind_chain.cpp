@@ -114,9 +114,9 @@ void bind_segment(py::module_& m) {
 void bind_from_urdf(py::class_<Chain>& cls) {
   cls.def_static(
       "from_urdf",
-      [](const py::object& source, const std::optional<std::string>& base, const std::optional<std::string>& tip,
+      [](const py::object& source, const std::optional<Text>& base, const std::optional<Text>& tip,
          const MaybeArray& acceleration) {
-        const auto text = py::module_::import("os").attr("fspath")(source).cast<std::string>();
+        const std::string text = source_argument(source);
         std::vector<double> limits;
         if (acceleration) {
           const Array array = Array::ensure(*acceleration);
@@ -126,7 +126,7 @@ void bind_from_urdf(py::class_<Chain>& cls) {
           }
           limits.assign(array.data(), array.data() + array.size());
         }
-        const Chain chain = Chain::from_urdf(text, base.value_or(""), tip.value_or(""), limits);
+        const Chain chain = Chain::from_urdf(text, base.value_or(Text{}), tip.value_or(Text{}), limits);
         warn(chain.warnings());
         return chain;
       },

@@ -38,8 +38,7 @@ IndexFunction function_argument(const std::string& index, const ArrayLike& k, do
 }
 
 // An index of J (m, n), or of every J of J (B, m, n).
-NumberOrArray index_of_jacobian(const ArrayLike& jacobian, const std::string& index, const ArrayLike& k,
-                                double length_scale) {
+NumberOrArray index_of_jacobian(const ArrayLike& jacobian, const Text& index, const ArrayLike& k, double length_scale) {
   const IndexFunction function = function_argument(index, k, length_scale);
   const auto of = [&function](const TaskJacobian& j) {
     if (function.rows() != 0 && function.rows() != j.rows()) {
@@ -71,7 +70,7 @@ NumberOrArray index_of_jacobian(const ArrayLike& jacobian, const std::string& in
 
 // Values and gradients of an index at q (n,), or (B, n).
 py::typing::Tuple<py::array_t<double>, py::array_t<double>> evaluate_index(const Chain& chain, const ArrayLike& q,
-                                                                           const std::string& index, const ArrayLike& k,
+                                                                           const Text& index, const ArrayLike& k,
                                                                            double length_scale, int threads,
                                                                            bool gradients) {
   const IndexFunction function = function_argument(index, k, length_scale);

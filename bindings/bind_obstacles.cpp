@@ -146,8 +146,7 @@ void bind_makers(py::class_<ArmSpheres>& c) {
       .def_static(
           "from_urdf",
           [](const Chain& chain, const py::object& source, double radius) {
-            const auto text = py::module_::import("os").attr("fspath")(source).cast<std::string>();
-            return ArmSpheres::from_urdf(chain, text, radius);
+            return ArmSpheres::from_urdf(chain, source_argument(source), radius);
           },
           py::arg("chain"), py::arg("source"), py::arg("radius") = 0.05,
           "Covers the boxes, cylinders and spheres of a URDF; links with meshes as along_links does.")

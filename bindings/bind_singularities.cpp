@@ -206,7 +206,7 @@ void bind_singularities(py::module_& m) {
         for (int i = 0; i < s.size(); ++i) text += (i ? ", " : " ") + s.set(i).name;
         return text + ")";
       });
-  m.def("load_singular_sets", &SingularSets::load, py::arg("name"));
+  m.def("load_singular_sets", [](const Text& name) { return SingularSets::load(name); }, py::arg("name"));
   m.def("known_singular_sets", []() -> Strings { return py::tuple(py::cast(SingularSets::names())); });
   m.def("singular_sets_of", &SingularSets::of, py::arg("chain"));
 }

@@ -78,7 +78,7 @@ void bind_solution(py::module_& m) {
 void bind_velocity_solver(py::module_& m) {
   py::class_<VelocitySolver>(m, "VelocitySolver",
                              "Resolves twists at given Jacobians by one method. Keeps only a warm start.")
-      .def(py::init([](const Method& method, double length_scale, const MaybeArray& mask, const std::string& frame) {
+      .def(py::init([](const Method& method, double length_scale, const MaybeArray& mask, const Text& frame) {
              return VelocitySolver(method, length_scale, task_argument(object_of(mask), frame));
            }),
            py::arg("method"), py::arg("length_scale") = 1.0, py::arg("mask") = py::none(), py::arg("frame") = "base",

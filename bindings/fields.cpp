@@ -90,7 +90,7 @@ std::vector<py::handle> Signature::sort(const py::args& args, const py::kwargs& 
   }
   for (std::size_t i = 0; i < args.size(); ++i) out[i] = args[i];
   for (const auto& [key, value] : kwargs) {
-    const std::string name = key.cast<std::string>();
+    const std::string name = text_argument(key, "option");
     const auto slot = std::find_if(slots.begin(), slots.end(), [&](const Slot& s) { return s.name == name; });
     if (slot == slots.end()) {
       py::list names;

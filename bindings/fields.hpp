@@ -193,7 +193,7 @@ struct Argument<T> {
   }
   static T from(py::handle object, const char* what) {
     const bool is_text = py::isinstance<py::str>(object);
-    const std::string text = is_text ? object.cast<std::string>() : "";
+    const std::string text = is_text ? text_argument(object, what) : "";
     std::string need;
     for (std::size_t i = 0; i < Words<T>::all.size(); ++i) {
       const auto& word = Words<T>::all[i];

@@ -97,19 +97,27 @@ class Driven:
 
 @pytest.fixture
 def drive(browser, tmp_path):
-    """drive(robot): a session, its page, and a tab that shows it."""
+    """drive(robot): a session, its page, and a tab that shows it; drive(beside=page): another browser of a page."""
     opened = []
 
-    def drive(robot="ufactory_xarm7", **options):
+    def drive(robot="ufactory_xarm7", beside=None, phone=False, **options):
+        shape = {"viewport": {"width": 1400, "height": 1000}}
+        if phone:
+            shape = {"viewport": {"width": 390, "height": 844}, "is_mobile": True, "has_touch": True}
+        tab = browser.new_page(**shape)
+        if beside is not None:
+            opened.append((None, None, tab))
+            return Driven(beside.session, beside.server, tab)
         session = Session(robot, pose_timeout=POSE_TIMEOUT, **options)
         session.__enter__()
         server = Page(session, port=0, directory=tmp_path)
-        tab = browser.new_page(viewport={"width": 1400, "height": 1000})
         opened.append((session, server, tab))
         return Driven(session, server, tab)
 
     yield drive
-    for session, server, tab in opened:
+    for _, _, tab in opened:
         tab.close()
-        server.close()
-        session.__exit__()
+    for session, server, _ in opened:
+        if session is not None:
+            server.close()
+            session.__exit__()

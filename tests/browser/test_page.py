@@ -169,7 +169,15 @@ def test_stop_and_a_lost_browser_hold(drive):
     page.wait(lambda: session.goal is not None, "a goal")
     page.press("Stop")
     page.wait(lambda: session.goal is None and page.status() == "HOLDING", "stopped")
+    page.tab.get_by_text("holding: Stop was pressed in browser 0").wait_for()
     page.go_to(0.3, 0.3, 0.3)
+    page.tab.get_by_text("release the stop first").first.wait_for()
+    assert session.goal is None
+    keep(page.tab, "teleop-stopped.png")
+    page.press("Release the stop")
+    page.wait(lambda: not session.stopped, "released")
+    assert session.goal is None
+    page.go_to(0.3, 0.3, 0.31)
     page.wait(lambda: session.goal is not None, "a goal")
     page.tab.goto("about:blank")
     page.wait(lambda: session.goal is None, "the browser is missed")
@@ -192,3 +200,102 @@ def test_a_recording_is_replayed(drive):
     page.press("Stop")
     page.wait(lambda: "replaying" not in page.tab.locator("#sk-status").inner_text(), "ended")
     assert page.errors == []
+
+
+def test_a_second_browser_sees_who_drives_and_takes_over(drive):
+    first = drive("ur10")
+    second = drive(beside=first)
+    session = first.session
+    first.go_to(0.6, 0.3, 0.5)
+    first.wait(lambda: session.goal is not None, "a goal")
+    second.tab.locator("#sk-driver", has_text="browser 0 of 2").wait_for()
+    second.tab.get_by_text("This is browser 1.").wait_for()
+    goal = session.goal
+    second.control("hold joint limits").click()
+    second.tab.get_by_text("browser 0 drives: press 'Take over' first").first.wait_for()
+    second.wait(lambda: second.control("hold joint limits").is_checked(), "the box shows the setting again")
+    assert session.settings.limits
+    assert session.goal is goal
+    second.press("Take over")
+    first.tab.locator("#sk-driver", has_text="browser 1 of 2").wait_for()
+    assert session.goal is None
+    second.control("hold joint limits").click()
+    second.wait(lambda: not session.settings.limits, "limits off, by the driver")
+    assert first.errors == second.errors == []
+
+
+def test_a_page_from_elsewhere_cannot_reach_the_arm(drive):
+    page = drive("ur10")
+    elsewhere = page.tab.context.new_page()
+    elsewhere.goto("data:text/html,<p>a page of somebody else</p>")
+    address = page.server.url.replace("http", "ws").rstrip("/")
+    open_it = """address => new Promise(done => {
+        const socket = new WebSocket(address, ["viser-v%s"]);
+        socket.onopen = () => done("open"); socket.onerror = () => done("refused");
+    })"""
+    import viser
+
+    version = open_it % viser.__version__
+    assert elsewhere.evaluate(version, address) == "refused"  # although it knows the token
+    assert page.tab.evaluate(version, address) == "open"
+    assert page.tab.evaluate(version, address.rsplit("/", 1)[0]) == "refused"
+    elsewhere.close()
+
+
+def test_a_typed_target_stays_as_it_was_typed(drive):
+    page = drive("ur10")
+    page.wait(lambda: page.session.latest is not None, "a sample")
+    page.tab.wait_for_timeout(1000)
+    boxes = page.control("target [m]")
+    boxes.nth(0).fill("0.61234")
+    boxes.nth(0).press("Enter")
+    page.wait(lambda: page.session.goal is not None and page.session.goal[0, 3] == 0.61234, "the goal, not rounded")
+    boxes.nth(2).fill("0.5")
+    page.wait(lambda: page.session.goal[2, 3] == 0.5, "the goal")
+    page.press("Stop")
+    page.wait(lambda: page.session.stopped and not page.session.latest["qdot"].any(), "stopped")
+    page.tab.wait_for_timeout(1000)
+    assert float(boxes.nth(0).input_value()) == pytest.approx(0.61234, abs=1e-3)  # viser shows three digits
+    assert float(boxes.nth(2).input_value()) == 0.5
+
+
+def test_only_the_controls_of_the_rule_are_there(drive):
+    page = drive("ur10")
+    assert page.control("singular gain").first.is_visible()
+    page.choose("method", "dls")
+    page.wait(lambda: page.control("singular gain").count() == 0, "gone")
+    assert page.control("γ").count() == 0
+    assert page.control("gain [1/s]").first.is_visible()
+    page.choose("method", "jparse")
+    page.wait(lambda: page.control("γ").count() > 0, "there again")
+
+
+def test_it_has_a_title_a_legend_and_a_layout_for_a_phone(drive):
+    page = drive(phone=True)
+    assert page.tab.title() == "sigmaik · ufactory_xarm7"
+    page.tab.wait_for_timeout(3000)
+    keep(page.tab, "teleop-phone.png")
+    canvas = page.tab.locator("canvas").first.bounding_box()
+    stop = page.tab.get_by_role("button", name="Stop", exact=True).bounding_box()
+    assert canvas["width"] == 390
+    assert canvas["height"] == pytest.approx(422, abs=2)
+    assert stop["y"] > canvas["height"]  # the panel covers nothing of the picture
+    assert stop["y"] + stop["height"] < 844
+    assert stop["width"] > 350
+    assert page.tab.evaluate("document.documentElement.scrollWidth") == 390
+    page.tab.locator("#sk-legend").scroll_into_view_if_needed()
+    assert "held back by limits" in page.tab.locator("#sk-legend").inner_text()
+    page.press("Stop")
+    page.wait(lambda: page.session.stopped, "stopped")
+    assert page.errors == []
+
+
+def test_the_view_shows_the_arm_large(drive):
+    page = drive()
+    page.tab.wait_for_timeout(3000)
+    with_arm = picture(page.tab)
+    page.server._scene.robot._view.show_visual = False
+    page.tab.wait_for_timeout(2000)
+    changed = np.abs(with_arm - picture(page.tab)).max(axis=2)[:, :1000] > 30.0  # beside the panel
+    rows = np.flatnonzero(changed.sum(axis=1) > 3)
+    assert rows[-1] - rows[0] > 250  # of 1000

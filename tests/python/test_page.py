@@ -1,5 +1,6 @@
 """Who reaches the page and what it survives: over HTTP and the websocket, as a browser and as a page from elsewhere."""
 
+import contextlib
 import http.client
 import itertools
 import os
@@ -78,13 +79,26 @@ class Browser:
         self.socket.close()
 
 
-@pytest.fixture
-def page(tmp_path):
+@contextlib.contextmanager
+def opened_page(directory):
     with Session("ur10", rate=250.0, pose_timeout=60.0) as session:
-        page = Page(session, port=0, directory=tmp_path, parquet=False)
+        page = Page(session, port=0, directory=directory, parquet=False)
         until(lambda: session.latest is not None)
         yield page
         page.close()
+
+
+@pytest.fixture
+def page(tmp_path):
+    with opened_page(tmp_path) as page:
+        yield page
+
+
+@pytest.fixture(scope="module")
+def shared(tmp_path_factory):
+    """A page for requests that are refused."""
+    with opened_page(tmp_path_factory.mktemp("episodes")) as page:
+        yield page
 
 
 @pytest.fixture
@@ -127,10 +141,10 @@ def get(page, path=None, **headers):
     return response, text
 
 
-def test_the_page_needs_its_whole_address(page):
-    token = urlsplit(page.url).path.strip("/")
+def test_the_page_needs_its_whole_address(shared):
+    token = urlsplit(shared.url).path.strip("/")
     assert len(token) >= 30
-    response, text = get(page)
+    response, text = get(shared)
     assert response.status == 200
     assert "<title>sigmaik · ur10</title>" in text
     assert response.getheader("Referrer-Policy") == "no-referrer"
@@ -145,7 +159,7 @@ def test_the_page_needs_its_whole_address(page):
         f"/?{token}",
         f"/{token}/../",
     ):
-        response, text = get(page, path)
+        response, text = get(shared, path)
         assert response.status in (403, 404), path
         assert "<html" not in text
     other = Gate("127.0.0.1")
@@ -169,15 +183,15 @@ def test_the_page_needs_its_whole_address(page):
         ({"Origin": "http://127.0.0.1"}, "a page of"),
     ],
 )
-def test_requests_from_elsewhere_are_refused(page, headers, words):
-    response, text = get(page, **headers)
+def test_requests_from_elsewhere_are_refused(shared, headers, words):
+    response, text = get(shared, **headers)
     assert response.status == 403
     assert words in text
 
 
-def test_an_own_name_and_tunnel_are_let_through(page):
+def test_an_own_name_and_tunnel_are_let_through(shared):
     for host in ("localhost:9000", "127.0.0.1:9000", "[::1]:9000", "LOCALHOST"):
-        assert get(page, Host=host, Origin=f"http://{host}")[0].status == 200
+        assert get(shared, Host=host, Origin=f"http://{host}")[0].status == 200
 
 
 def test_a_gate_that_is_open_to_the_network_takes_numbers_and_its_own_names():
@@ -200,16 +214,18 @@ def test_a_gate_that_is_open_to_the_network_takes_numbers_and_its_own_names():
         {"url": "no token"},
     ],
 )
-def test_a_websocket_from_elsewhere_is_refused(page, browsers, options):
+def test_a_websocket_from_elsewhere_is_refused(shared, options):
     from websockets.exceptions import InvalidStatus
 
     if "url" in options:
-        options = {"url": f"http://{urlsplit(page.url).netloc}/"}
+        options = {"url": f"http://{urlsplit(shared.url).netloc}/"}
     with pytest.raises(InvalidStatus, match="403"):
-        browsers(**options)
-    assert page._server.get_clients() == {}
-    own = f"http://{urlsplit(page.url).netloc}"
-    browsers(origin=own).drag(away(page))
+        Browser(shared, **options)
+    assert shared._server.get_clients() == {}
+
+
+def test_a_websocket_of_the_page_itself_is_let_through(page, browsers):
+    browsers(origin=f"http://{urlsplit(page.url).netloc}").drag(away(page))
     until(lambda: moves(page))
 
 
@@ -295,7 +311,47 @@ def test_one_browser_drives_and_the_others_see_who(page, browsers):
     until(lambda: page.session.goal is not None)
     first.close()
     until(lambda: page.session.goal is None)
-    assert page.session.why_it_holds == "the browser that drove is gone"
+    assert page.session.why_it_holds in ("the browser that drove is gone", "the browser that drove did not answer")
+
+
+class Stick:
+    name, held, pushed = "a stick", False, 1.0
+
+    def read(self):
+        from sigmaik.teleop.devices import Reading
+
+        return Reading(np.array([0.0, 0.0, self.pushed, 0.0, 0.0, 0.0]), self.held)
+
+    def close(self):
+        pass
+
+
+def test_a_device_is_no_second_driver(page, browsers, monkeypatch):
+    stick = Stick()
+    monkeypatch.setattr("sigmaik.teleop.page.open_device", lambda name: stick)
+    first, second = browsers(), browsers()
+    page.open_device("gamepad")  # of the command line: a driver of its own
+    stick.held = True
+    until(lambda: moves(page))
+    first.drag(away(page))
+    time.sleep(0.1)
+    assert page.session.goal is None
+    first.set(page._controls.take)
+    until(lambda: not moves(page))  # although its button is held
+    first.set(page._controls.device, "gamepad")  # works for this browser
+    until(lambda: moves(page))
+    assert page._seat.driver == first.id
+    first.set(_stop_button(page))
+    until(lambda: not moves(page))
+    first.set(page._controls.release)
+    until(lambda: moves(page))
+    second.set(page._controls.take)
+    until(lambda: not moves(page))
+    stick.held = False
+    second.drag(away(page))
+    until(lambda: moves(page))
+    time.sleep(0.1)
+    assert page.session.goal is not None  # a button let go is none of the driver's
 
 
 # --- what the program survives

@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sigmaik._core import Chain
+from sigmaik._core import Chain, Error
 from sigmaik._types import Array
 
 __all__ = ["Arm", "home", "load", "names", "open", "path"]
@@ -47,7 +47,7 @@ def names() -> tuple[str, ...]:
 
 
 def path(name: str) -> Path:
-    """Path of the arm's URDF file. ValueError where no arm of that name is shipped."""
+    """Path of the arm's URDF file. Error where no arm of that name is shipped."""
     _check(name)
     return Path(str(resources.files(__name__) / (name + _SUFFIX)))
 
@@ -56,7 +56,7 @@ def load(name: str) -> Chain:
     """The arm as a chain from its root link to ``flange``, with its limits.
 
     Units: m, rad, rad/s, rad/s^2, N m; a limit that is not public is infinite.
-    ValueError where no arm of that name is shipped; for a file of your own use ``Chain.from_urdf``.
+    Error where no arm of that name is shipped; for a file of your own use ``Chain.from_urdf``.
     """
     return Chain.from_urdf(str(path(name)), tip="flange")
 
@@ -64,7 +64,7 @@ def load(name: str) -> Chain:
 def home(name: str) -> Array:
     """Joint angles (n,) [rad] of a pose inside the limits and away from singularities.
 
-    A new array each time. ValueError where no arm of that name is shipped.
+    A new array each time. Error where no arm of that name is shipped.
     """
     _check(name)
     table = json.loads((resources.files(__name__) / "homes.json").read_text(encoding="utf-8"))
@@ -77,7 +77,7 @@ def open(arm: str | os.PathLike[str], base: str | None = None, tip: str | None =
     base, tip: link names; by default the root and the only leaf, for a shipped arm the root and ``flange``
 
     The home of a file, and of a shipped arm between other links, is the middle of the joint ranges; where the arm is
-    singular there, home is the best conditioned of 32 random configurations (with fixed seeds). ValueError where no arm
+    singular there, home is the best conditioned of 32 random configurations (with fixed seeds). Error where no arm
     and no file has this name, or where the file describes no chain.
     """
     if arm in names():
@@ -88,7 +88,7 @@ def open(arm: str | os.PathLike[str], base: str | None = None, tip: str | None =
         file = Path(arm)
         name = file.stem
         if not file.is_file():
-            raise ValueError(f"no shipped arm and no URDF file '{arm}'; shipped are {', '.join(names())}")
+            raise Error(f"no shipped arm and no URDF file {str(arm)!r}; shipped are {', '.join(names())}")
     chain = Chain.from_urdf(str(file), base=base, tip=tip)
     return Arm(name, chain, _middle(chain), file)
 
@@ -113,4 +113,4 @@ def _check(name: str) -> None:
         return
     near = difflib.get_close_matches(str(name).lower(), shipped, n=1, cutoff=0.4)
     hint = f"; did you mean {near[0]!r}?" if near else "."
-    raise ValueError(f"no arm named {name!r} is shipped{hint} There are: {', '.join(shipped)}")
+    raise Error(f"no arm named {name!r} is shipped{hint} There are: {', '.join(shipped)}")

@@ -2,9 +2,10 @@
 
     session = sigmaik.teleop.Session("ufactory_xarm7")
     with session:                                  # starts the servo, and stops it
-        session.start_recording()
+        session.start_recording("episode.part")    # on disk as it goes; without a file: in memory
         session.follow(target)                     # (4, 4); or session.twist([vx, vy, vz, wx, wy, wz])
         session.configure(method="dls")            # during the motion, without a jump
+        session.stop()                             # latched: commands are refused until session.release()
         episode = session.stop_recording()
     episode.save("episode.npz")
 

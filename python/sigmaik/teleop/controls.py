@@ -44,7 +44,7 @@ class Controls:
         self._settings: list[tuple[Any, str, Callable[[Settings], Any]]] = []
         gui = self._gui
         gui.configure_theme(control_width="large", show_share_button=False)
-        gui.set_panel_label(f"sigmaik · {page.session.name}")
+        gui.set_panel_label(gauges.printable(f"sigmaik · {page.session.name}"))
         self.status = gui.add_html("")
         stop = gui.add_button("Stop", color="red", hint="or the space bar; anybody may stop")
         stop.on_click(lambda event: page._stop(event))
@@ -100,7 +100,9 @@ class Controls:
             home = gui.add_button("Put the arm back", hint="at once, where it started: it is a simulated arm")
             self._ask(home, lambda event: page._restart())
             self.device: Any = gui.add_dropdown(
-                "device", ("none", *DEVICES), hint="plugged into the servo's machine; whoever chooses it drives"
+                "device",
+                ("none", *DEVICES),
+                hint="plugged into the servo's machine; it drives for the browser that chooses it",
             )
             self.device.on_update(
                 lambda event: self._if_asked(event, lambda: page._choose_device(event, self.device.value))
@@ -189,7 +191,7 @@ class Controls:
             self.record = gui.add_button("Record", hint="every cycle, until the button is pressed again")
             self._ask(self.record, page._toggle_recording)
             self.recorded = gui.add_markdown("no recording")
-            self.folder: Any = gui.add_text("folder", str(page.directory), visible=False)
+            self.folder: Any = gui.add_text("folder", gauges.printable(str(page.directory)), visible=False)
             self.save = gui.add_button("Save what is in memory", color="orange", visible=False)
             self._ask(self.save, lambda event: page._save_unsaved(event, self.folder.value))
             self.episodes: Any = gui.add_dropdown("episode", page._files())

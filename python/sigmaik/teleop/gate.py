@@ -23,6 +23,8 @@ from urllib.parse import urlsplit
 
 from sigmaik import Error
 
+from .gauges import printable
+
 if TYPE_CHECKING:
     import viser
 
@@ -60,7 +62,7 @@ class Gate:
         """
         self.token = secrets.token_urlsafe(24)
         self.opened = False  # whether a server has taken the gate
-        self._title = title
+        self._title = printable(title)
         self._local = _is_loopback(host)
         own = () if self._local else (socket.gethostname(), f"{socket.gethostname()}.local")
         self._names = {name.lower() for name in ("localhost", host, *own, *names)}
@@ -133,7 +135,7 @@ def open_server(host: str, port: int, label: str, gate: Gate) -> tuple[viser.Vis
     with _PATCHING, quiet():
         websockets_server.serve = guarded  # type: ignore[assignment,misc]
         try:
-            server = viser.ViserServer(host=host, port=port, label=label, verbose=False)
+            server = viser.ViserServer(host=host, port=port, label=printable(label), verbose=False)
         finally:
             websockets_server.serve = serve  # type: ignore[misc]
     taken = server.get_port()

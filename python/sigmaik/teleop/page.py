@@ -12,7 +12,7 @@ import logging
 import pathlib
 import threading
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Hashable, Iterable, Mapping
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -74,7 +74,7 @@ class Page:
         self.session, self.recorder = session, Recorder(session, directory, parquet)
         self._seat = seat.Seat()
         self._device: TwistDevice | None = None
-        self._device_of: str | None = None  # the driver that the device is
+        self._device_of: Hashable | None = None  # the driver that the device works for
         self._device_held = False
         self._replay: _Replay | None = None
         self._closed = threading.Event()
@@ -135,14 +135,18 @@ class Page:
         """Returns after `seconds`; None: never, but for an interrupt."""
         self._closed.wait(seconds)
 
-    def open_device(self, name: str) -> str:
-        """Drives by a gamepad or a SpaceMouse ("none" ends this). Returns its name; ValueError without the device."""
+    def open_device(self, name: str, driver: Hashable | None = None) -> str:
+        """Drives by a gamepad or a SpaceMouse ("none" ends this). Returns its name; ValueError without the device.
+
+        driver: the browser that the device works for; None: the device is a driver of its own
+        """
         device = None if name == "none" else open_device(name)
         old, self._device = self._device, device
         if old is not None:
             old.close()
-        self._seat.leave(self._device_of)
-        self._device_of = f"the {name}" if device is not None else None
+        if not isinstance(self._device_of, int):
+            self._seat.leave(self._device_of)
+        self._device_of = (driver if driver is not None else f"the {name}") if device is not None else None
         if device is not None:
             self._seat.take_over(self._device_of)
         self.session.hold("the device was changed")
@@ -236,7 +240,7 @@ class Page:
 
     def _choose_device(self, event: Any, name: str) -> None:
         try:
-            self._say(event, "device", self.open_device(name))
+            self._say(event, "device", self.open_device(name, event.client_id))
         except Exception:
             self._controls.device.value = "none"
             raise
@@ -350,6 +354,8 @@ class Page:
 
     def _lost(self, client: viser.ClientHandle) -> None:
         """Stops the arm if the browser that drove it, or the last browser, is gone."""
+        if self._device_of == client.client_id:
+            self._device_of = "the device"
         if self._seat.leave(client.client_id) or not self._server.get_clients():
             self._hold("the browser that drove is gone")
 

@@ -58,6 +58,7 @@ class Session:
         ValueError where an argument is wrong, with the facts.
         """
         name, chain, home, self.source = sk.robots.open(robot, base, tip)
+        self._urdf = self.source.read_text(encoding="utf-8")  # a recording needs the text, whatever becomes of the file
         if not 1.0 <= rate <= 20e3:
             raise ValueError(f"rate must be from 1 to 20000 Hz, not {rate:g}")
         for what, value in (("pose_timeout", pose_timeout), ("twist_timeout", twist_timeout)):
@@ -104,8 +105,9 @@ class Session:
             self._hold("the session has ended")  # what another thread commanded meanwhile
             if self._recorded is not None:
                 self._recording_ended = True
-            if self._journal is not None:
-                self._journal.close()
+            journal = self._journal
+        if journal is not None:
+            journal.close()
 
     # --- commands
 
@@ -241,6 +243,8 @@ class Session:
             if self._journal is not None:
                 self._journal.note(before=np.stack(self._before).tolist())
         kept = samples[first : first + self.longest_recording - self._recorded_cycles]
+        if len(kept) == 0:
+            return
         self._recorded.append(kept)
         self._recorded_cycles += len(kept)
         if self._journal is not None:
@@ -309,23 +313,22 @@ class Session:
             recorded, self._recorded = self._recorded, None
             cycles, self._recorded_cycles = self._recorded_cycles, 0
             journal, self._journal = self._journal, None
-            if journal is not None:
-                journal.close() if cycles else journal.discard()
-            if cycles == 0:
-                raise sk.Error("no cycle was recorded")
-            assert self._before is not None
-            samples: Samples = np.concatenate(recorded)
-            used = set(np.unique(samples["configuration"]).tolist())
-            return Episode(
-                samples,
-                Arm(self.name, self._urdf(), self.chain, self.home),
-                self._dt,
-                {number: s for number, s in self._history.items() if number in used},
-                self._before,
-            )
-
-    def _urdf(self) -> str:
-        return self.source.read_text(encoding="utf-8")
+            before, history = self._before, dict(self._history)
+        # Without the lock, so that no command waits for the disk.
+        if journal is not None:
+            journal.close() if cycles else journal.discard()
+        if cycles == 0:
+            raise sk.Error("no cycle was recorded")
+        assert before is not None
+        samples: Samples = np.concatenate(recorded)
+        used = set(np.unique(samples["configuration"]).tolist())
+        return Episode(
+            samples,
+            Arm(self.name, self._urdf, self.chain, self.home),
+            self._dt,
+            {number: s for number, s in history.items() if number in used},
+            before,
+        )
 
     def _note(self) -> dict[str, Any]:
         """What the file of a recording says before its first cycle."""
@@ -335,7 +338,7 @@ class Session:
             "base": self.chain.base,
             "tip": self.chain.tip,
             "dt": self._dt,
-            "urdf": self._urdf(),
+            "urdf": self._urdf,
             "joint_names": list(self.chain.joint_names),
             "limits": {name: getattr(limits, name).tolist() for name in ("lower", "upper", "velocity", "acceleration")},
             "home": self.home.tolist(),
