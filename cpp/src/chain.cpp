@@ -47,11 +47,6 @@ void check_inertia(const Segment& s) {
           " kg must be finite and not negative");
   require(inertia.center_of_mass.allFinite() && inertia.tensor.allFinite(), "link '", s.link_name,
           "': its inertia has an entry that is not finite");
-  const Eigen::Matrix3d& t = inertia.tensor;
-  const double least = detail::symmetric_eigen(Eigen::Matrix3d(0.5 * (t + t.transpose()))).values[0];
-  const double rounding = 1e-12 + 1e-9 * t.cwiseAbs().maxCoeff();
-  require(least >= -rounding, "link '", s.link_name, "': a principal moment of its inertia is ", least,
-          " kg m²; no body has a negative one");
 }
 
 void check_origin(const Segment& s) {

@@ -1,6 +1,7 @@
 #pragma once
 // What a mass distribution must satisfy to belong to a rigid body.
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 
@@ -28,6 +29,13 @@ inline std::string inertia_defect(const Inertia& inertia) {
   }
   if (inertia.mass == 0.0 && !t.isZero(0.0)) return "a tensor without mass";
   return {};
+}
+
+/// [kg m²] The least principal moment; zero where it is negative by no more than rounding.
+inline double least_moment(const Inertia& inertia) {
+  const Eigen::Matrix3d symmetric = 0.5 * (inertia.tensor + inertia.tensor.transpose());
+  const double least = symmetric_eigen(symmetric).values[0];
+  return least < -1e-12 - 1e-9 * symmetric.cwiseAbs().maxCoeff() ? least : std::max(least, 0.0);
 }
 
 }  // namespace sigmaik::detail

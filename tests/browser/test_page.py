@@ -173,7 +173,6 @@ def test_stop_and_a_lost_browser_hold(drive):
     page.go_to(0.3, 0.3, 0.3)
     page.tab.get_by_text("release the stop first").first.wait_for()
     assert session.goal is None
-    keep(page.tab, "teleop-stopped.png")
     page.press("Release the stop")
     page.wait(lambda: not session.stopped, "released")
     assert session.goal is None

@@ -27,7 +27,8 @@ _FINITE = ("time", "q", "qdot", "target", "pose", "pose_error", "asked_twist", "
 
 def sample_dtype(chain: sk.Chain) -> np.dtype[Any]:
     """The type of a sample of this arm, as `ServoLoop.read` gives samples."""
-    servo = sk.Servo(chain)
+    # Without limits: a servo warns of limits that the arm does not have.
+    servo = sk.Servo(chain, position_limits=False, velocity_limits=False, acceleration_limits=False, jerk_limits=False)
     servo.reset(chain.random_configuration(0))
     dtype: np.dtype[Any] = sk.ServoLoop(servo, history=2).read().dtype
     return dtype

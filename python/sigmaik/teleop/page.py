@@ -81,6 +81,7 @@ class Page:
         self._linear_speed, self._angular_speed = 0.15, 0.6
         self._box_follows = True  # whether the box of the target shows where the tool rests
         self._troubles: dict[str, str] = {}  # the last error of each thread
+        self._told = ""  # the last trouble of a recording's file
         self._server, self.url = open_server(
             host, port, f"sigmaik {session.name}", Gate(host, names, f"sigmaik · {session.name}")
         )
@@ -103,6 +104,7 @@ class Page:
         self._threads = [
             threading.Thread(target=self._repeat, args=(what, turn, period), name=f"sigmaik {what}", daemon=True)
             for what, turn, period in (
+                ("recording", self._read, 1.0 / DRAWN),
                 ("drawing", _Drawing(self).turn, 1.0 / DRAWN),
                 ("watching the browser", self._watch, HEARTBEAT),
                 ("reading the device", self._poll, 1.0 / POLLED),
@@ -322,6 +324,15 @@ class Page:
             due = max(due + period, time.monotonic())
             self._closed.wait(due - time.monotonic())
 
+    def _read(self) -> None:
+        """In a thread of its own, so that slow drawing loses no sample."""
+        self.session.read()
+        trouble = self.session.recording_trouble
+        if trouble and trouble != self._told:
+            self._told = trouble
+            _log.error("%s; the recording goes on in memory", trouble)
+            self._say_to_all("the recording goes on in memory", trouble)
+
     def _recover(self) -> None:
         try:
             lines = self.recorder.recover()
@@ -393,9 +404,7 @@ class _Drawing:
 
     def turn(self) -> None:
         page, session = self._page, self._page.session
-        session.read()  # before anything that can fail: recordings are made here
         self._ticks += 1
-        self._tell_trouble()
         sample, replaying = session.latest, ""
         replay = page._replay
         if replay is not None:
@@ -413,13 +422,6 @@ class _Drawing:
                 self._show_place(sample)
         if self._ticks % round(DRAWN / GAUGES) == 0:
             self._show_gauges(sample, replaying)
-
-    def _tell_trouble(self) -> None:
-        page, trouble = self._page, self._page.session.recording_trouble
-        if trouble and page._troubles.get("recording") != trouble:
-            page._troubles["recording"] = trouble
-            _log.error("%s; the recording goes on in memory", trouble)
-            page._say_to_all("the recording goes on in memory", trouble)
 
     def _show_place(self, sample: Any) -> None:
         """The box shows where a jogged tool rests; what somebody typed is never overwritten."""
