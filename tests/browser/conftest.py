@@ -104,6 +104,8 @@ def drive(browser, tmp_path):
         shape = {"viewport": {"width": 1400, "height": 1000}}
         if phone:
             shape = {"viewport": {"width": 390, "height": 844}, "is_mobile": True, "has_touch": True}
+        if beside is not None:
+            shape = {"viewport": {"width": 800, "height": 600}}  # two pictures are slow without a graphics card
         tab = browser.new_page(**shape)
         if beside is not None:
             opened.append((None, None, tab))

@@ -80,6 +80,7 @@ class Page:
         self._closed = threading.Event()
         self._linear_speed, self._angular_speed = 0.15, 0.6
         self._box_follows = True  # whether the box of the target shows where the tool rests
+        self._shown_place: Any = (0.0, 0.0, 0.0)  # what this program wrote into the box last
         self._troubles: dict[str, str] = {}  # the last error of each thread
         self._told = ""  # the last trouble of a recording's file
         self._server, self.url = open_server(
@@ -197,6 +198,10 @@ class Page:
         self._go(target)
         self._scene.place_target(target.matrix)
 
+    def _let_box_follow(self) -> None:
+        """From now on the box shows where the tool rests, until somebody types."""
+        self._shown_place, self._box_follows = self._controls.position.value, True
+
     def _go(self, target: TargetPose) -> None:
         if self._replay is not None:
             raise sk.Error("a recording is replayed: end that first")
@@ -211,7 +216,7 @@ class Page:
         def jog() -> None:
             if self._replay is not None:
                 raise sk.Error("a recording is replayed: end that first")
-            self._box_follows = True
+            self._let_box_follow()
             self.session.twist(self._scaled(axis))
 
         self._drive(event, jog)
@@ -237,7 +242,7 @@ class Page:
     def _restart(self) -> None:
         self.session.restart()
         self._replay = None
-        self._box_follows = True
+        self._let_box_follow()
         self._scene.clear_trace()
 
     def _choose_device(self, event: Any, name: str) -> None:
@@ -390,7 +395,7 @@ class Page:
                 self._seat.claim(self._device_of)
             except sk.Error:
                 return  # a browser took over
-            self._box_follows = True
+            self._let_box_follow()
             self.session.twist(self._scaled(reading.twist))
         elif held and self._seat.driver == self._device_of:
             self.session.hold("the device's button was let go")
@@ -425,12 +430,12 @@ class _Drawing:
 
     def _show_place(self, sample: Any) -> None:
         """The box shows where a jogged tool rests; what somebody typed is never overwritten."""
-        page = self._page
-        if not page._box_follows or sample["qdot"].any():
-            return
+        page, box = self._page, self._page._controls.position
         at = tuple(np.round(sample["pose"][:3, 3], 3).tolist())
-        if at != page._controls.position.value:
-            page._controls.position.value = at
+        # Typed just now: the value is there before the request is handled.
+        typed = box.value != page._shown_place
+        if page._box_follows and not typed and at != box.value and not sample["qdot"].any():
+            box.value = page._shown_place = at
 
     def _show_gauges(self, sample: Any, replaying: str) -> None:
         page, session, controls = self._page, self._page.session, self._page._controls
