@@ -1263,7 +1263,7 @@ class Dynamics:
         gravity: (3,) [m/s²] in base axes; by default 9.80665 m/s² along −z.
         payload: what the tip carries, in the tip's frame.
 
-        Raises Error where a movable joint carries no link whose inertia is known, and where the payload is no body:
+        Raises Error where a link has a principal moment below 0, where a movable joint carries no link whose inertia is known, and where the payload is no body:
         a mass below 0, a tensor that is not symmetric, a principal moment beyond the sum of the other two.
         """
     def __repr__(self) -> str:
