@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+import types
 import zipfile
 
 import numpy as np
@@ -77,6 +78,7 @@ def refused(arrays, tmp_path, words):
         ("status", -1, "status -1"),
         ("command", 17, "command 17"),
         ("guide", 55, "guide 55"),
+        ("state", 77, "state 77"),
         ("q", np.nan, "q has .* rows that are not finite"),
         ("qdot", np.inf, "qdot has"),
         ("pose", np.nan, "pose has"),
@@ -466,6 +468,37 @@ def test_a_stop_is_latched_until_it_is_released():
         assert not session.read()["qdot"].any()  # the release is no command
         session.follow(target)
         until(lambda: (session.read(), np.abs(session.latest["qdot"]).max() > 0.01)[1])
+
+
+class FaultyLoop:
+    """A loop with a fault until the fault is acknowledged and the loop released."""
+
+    def __init__(self, loop):
+        self.loop, self.calls = loop, []
+        self.fault = types.SimpleNamespace(text="3000 cycles were left out")
+
+    def acknowledge(self):
+        self.calls.append("acknowledge")
+        self.fault = None
+
+    def release(self):
+        self.calls.append("release")
+
+    def __getattr__(self, name):
+        return getattr(self.loop, name)
+
+
+def test_a_fault_of_the_loop_is_a_stop_that_is_released():
+    with Session("ur10", rate=500.0) as session:
+        session._loop = FaultyLoop(session._loop)
+        assert session.stopped == session.why_it_holds == "fault: 3000 cycles were left out"
+        with pytest.raises(sk.Error, match="stopped .fault: 3000 cycles were left out.: release"):
+            session.twist([0.0] * 6)
+        session.release()
+        assert session._loop.calls == ["acknowledge", "release"]
+        assert not session.stopped
+        session.twist([0.0] * 6)
+        session._loop = session._loop.loop
 
 
 def test_a_session_says_why_it_holds():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import enum
 import math
 from collections.abc import Collection
 from typing import Any
@@ -19,8 +20,13 @@ Samples = NDArray[np.void]
 LONGEST_CYCLE = 1.0
 
 #: Fields that older recordings do not have, with their value there.
-_LATER = {"singular_directions": math.nan, "guide": int(sk.GuideState.OFF), "guide_joints": 0}
-_NAMED = {"status": sk.Status, "command": sk.LoopCommand, "guide": sk.GuideState}
+_LATER = {"singular_directions": math.nan, "state": -1, "guide": int(sk.GuideState.OFF), "guide_joints": 0}
+_NAMED: dict[str, type[enum.IntEnum]] = {
+    "state": sk.LoopState,
+    "status": sk.Status,
+    "command": sk.LoopCommand,
+    "guide": sk.GuideState,
+}
 #: Fields that have numbers in every cycle. The others are NaN where no rule has run.
 _FINITE = ("time", "q", "qdot", "target", "pose", "pose_error", "asked_twist", "achieved_twist", "scale")
 
@@ -84,7 +90,7 @@ def check_samples(
     for name in _FINITE:
         _require_finite(samples, name)
     for name, values in _NAMED.items():
-        known = np.isin(samples[name], [int(value) for value in values])
+        known = np.isin(samples[name], [_LATER.get(name, 0), *(int(value) for value in values)])
         if not known.all():
             at = int(np.argmin(known))
             raise sk.Error(

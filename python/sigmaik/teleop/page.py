@@ -281,7 +281,7 @@ class Page:
         self._controls.recorded.content = gauges.printable(line)
         self._controls.episodes.options = files = self._files()
         self._controls.episodes.value = files[-1]
-        self._say(event, "saved", line)
+        self._say(event, "saved", line.partition(":")[0])
 
     def _files(self) -> tuple[str, ...]:
         return tuple(gauges.printable(name) for name in self.recorder.files) or ("none",)

@@ -93,7 +93,8 @@ class Session:
 
     def __enter__(self) -> Session:
         with self._lock:
-            self._hold("no command yet")  # a command of the last run may still be fresh
+            self._clear_fault()
+            self._hold("no command yet")
             self._loop.start()
             return self
 
@@ -125,7 +126,7 @@ class Session:
     def refresh(self) -> None:
         """Repeats the pose that the arm follows, so that the pose does not go stale."""
         with self._lock:
-            if self._goal is not None:
+            if self._goal is not None and not self.stopped:
                 self._loop.follow(self._goal, self.pose_timeout)
 
     def twist(self, twist: ArrayLike) -> None:
@@ -154,25 +155,37 @@ class Session:
             self._hold(why)
 
     def release(self) -> None:
-        """Ends a stop. The arm holds until the next command."""
+        """Ends a stop, and a fault of the loop. The arm holds until the next command.
+
+        Error where the loop has a fault and the arm does not rest yet.
+        """
         with self._lock:
-            if self._stopped:
+            fault = self._clear_fault()
+            if self._stopped or fault:
                 self._stopped = ""
                 self._hold("the stop was released; no command yet")
 
     @property
     def stopped(self) -> str:
-        """Why the session is stopped; empty while commands are taken."""
-        return self._stopped
+        """Why the session is stopped: by `stop`, or a fault of the loop; empty while commands are taken."""
+        fault = self._loop.fault
+        return self._stopped or ("" if fault is None else f"fault: {fault.text}")
 
     @property
     def why_it_holds(self) -> str:
         """Why the arm holds, where it holds."""
-        return self._stopped or self._why_it_holds
+        return self.stopped or self._why_it_holds
 
     def _refuse_if_stopped(self) -> None:
-        if self._stopped:
-            raise sk.Error(f"stopped ({self._stopped}): release the stop first")
+        if self.stopped:
+            raise sk.Error(f"stopped ({self.stopped}): release the stop first")
+
+    def _clear_fault(self) -> bool:
+        if self._loop.fault is None:
+            return False
+        self._loop.acknowledge()
+        self._loop.release()
+        return True
 
     def restart(self, q: ArrayLike | None = None) -> None:
         """Puts the (simulated) arm at q (n,), by default where it started, and ends a recording's run of cycles.
