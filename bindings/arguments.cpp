@@ -83,6 +83,10 @@ Twist twist_argument(py::handle object, const char* what) {
   return Eigen::Map<const Twist>(array_argument(object, what, {6}, "(6,): [v; ω]").data());
 }
 
+Eigen::Vector3d point_argument(py::handle object, const char* what) {
+  return Eigen::Map<const Eigen::Vector3d>(array_argument(object, what, {3}, "(3,)").data());
+}
+
 Pose pose_argument(py::handle object, const char* what) {
   py::object matrix = py::reinterpret_borrow<py::object>(object);
   if (!py::isinstance<py::array>(object)) {

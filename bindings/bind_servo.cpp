@@ -164,11 +164,24 @@ void bind_cycle(py::class_<Servo>& c) {
        "Raises Error, and holds, where the target is not a pose.")
       .def(
           "update_twist",
-          [](Servo& s, const ArrayLike& twist) {
+          [](Servo& s, const ArrayLike& twist, const std::string& frame, const MaybeArray& point) {
             require_started(s);
-            return checked(s.update_twist(twist_argument(twist, "twist")));
+            const Twist asked = twist_argument(twist, "twist");
+            if (frame == "base" && !point) return checked(s.update_twist(asked));
+            const Frame axes = task_argument(py::none(), frame).frame;
+            const Eigen::Vector3d at = point                 ? point_argument(*point, "point")
+                                       : axes == Frame::Tool ? Eigen::Vector3d(Eigen::Vector3d::Zero())
+                                                             : Eigen::Vector3d(s.tip().translation());
+            return checked(s.update_twist(asked, axes, at));
           },
-          py::arg("twist"), "One cycle along a twist (6,) [v; ω], base axes, at the tip's origin.")
+          py::arg("twist"), py::arg("frame") = "base", py::arg("point") = py::none(),
+          "One cycle along a twist (6,) [v; ω].\n\n"
+          "frame: the axes of twist and point, 'base' or 'tool'; jog devices send 'tool'.\n"
+          "point: (3,) [m] that moves at v: in base, or with frame='tool' from the tip's origin. None: the tip's "
+          "origin.")
+      .def_property_readonly("rough_targets", &Servo::rough_targets,
+                             "Targets of update() whose rotation was off by more than rounding (up to 1e-3 in RᵀR), "
+                             "and was made one.")
       .def("hold", &Servo::hold, "One cycle of the fastest stop that the limits allow, or of rest: HOLDING.")
       .def("continue_from", &Servo::continue_from, py::arg("other"),
            "Takes over from another servo of the same arm and dt, in the midst of its motion.\n\n"

@@ -207,6 +207,8 @@ void bind_statistics(py::module_& m) {
   py::class_<LoopStatistics>(m, "LoopStatistics", "How a ServoLoop keeps its rate.")
       .def_readonly("cycles", &LoopStatistics::cycles)
       .def_readonly("missed", &LoopStatistics::missed, "Cycles left out, as their time had passed.")
+      .def_readonly("rough_targets", &LoopStatistics::rough_targets,
+                    "Poses of follow() whose rotation was off by more than rounding, and was made one.")
       .def_readonly("unread", &LoopStatistics::unread, "Samples lost, as nobody read them in time.")
       .def_readonly("sink_errors", &LoopStatistics::sink_errors, "Exceptions of the sink.")
       .def_readonly("worst_delay", &LoopStatistics::worst_delay, "[s] from when a cycle was due to its start.")

@@ -69,6 +69,7 @@ void bind_answers(py::module_& m) {
       .def_readonly("outliers", &SampleCounts::outliers)
       .def_readonly("out_of_order", &SampleCounts::out_of_order)
       .def_readonly("invalid", &SampleCounts::invalid)
+      .def_readonly("rough", &SampleCounts::rough, "Samples whose rotation was off by more than rounding.")
       .def("__repr__", [](const SampleCounts& c) {
         return "SampleCounts(accepted=" + std::to_string(c.accepted) + ", relocated=" + std::to_string(c.relocated) +
                ", outliers=" + std::to_string(c.outliers) + ", out_of_order=" + std::to_string(c.out_of_order) +

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include <sigmaik/analytic_ik.hpp>
+#include <sigmaik/pose.hpp>
 
 #include "turn.hpp"
 
@@ -38,7 +39,7 @@ struct AnalyticWalk {
 
   template <typename Rule>
   void run(const Pose& pose, Rule& rule) const noexcept {
-    const Matrix3d rotation = orthonormal(pose.linear());
+    const Matrix3d rotation = nearest_rotation(pose.linear());
     const Matrix3d seen = ik.shoulder_.from_base.lazyProduct(rotation).lazyProduct(ik.tip_);
     const Vector3d centre = ik.shoulder_.from_base.lazyProduct(pose.translation() - ik.shoulder_.origin) + seen.col(0);
     const double reach = ik.reach_ + ik.tolerance_;
@@ -47,16 +48,6 @@ struct AnalyticWalk {
   }
 
  private:
-  // The rotation nearest to a matrix that is_pose() has accepted: the polar factor, by Newton's method.
-  static Matrix3d orthonormal(Matrix3d r) noexcept {
-    for (int i = 0; i < 3; ++i) {
-      const Matrix3d defect = r.transpose().lazyProduct(r) - Matrix3d::Identity();
-      if (defect.cwiseAbs().maxCoeff() < 1e-14) break;
-      r -= 0.5 * r.lazyProduct(defect);
-    }
-    return r;
-  }
-
   static constexpr int kTries = 32;  // values tried of a free angle
 
   // The i-th value to try of a free angle: `wish`, then values further and further from `wish`, around the circle.

@@ -100,13 +100,14 @@ void ConstrainedIk::reset(const JointRef& q, const JointRef& qdot) {
   end_arrival();
 }
 
-ConstrainedIkStep ConstrainedIk::update(const Pose& target) noexcept {
+ConstrainedIkStep ConstrainedIk::update(const Pose& asked) noexcept {
   ConstrainedIkStep step;
   if (tracker_.q().size() == 0) {
     step.q = step.qdot = JointVector::Zero(chain_.dof());
     return step;
   }
-  const bool good = is_pose(target.matrix());
+  const bool good = is_pose(asked.matrix());
+  const Pose target = good ? nearest_pose(asked) : asked;
   if (!good) {
     step.qdot = tracker_.stop();
   } else {

@@ -62,11 +62,40 @@ Twist pose_error(const Pose& current, const Pose& target) noexcept {
   return error;
 }
 
+namespace {
+
+Eigen::Matrix3d defect_of(const Eigen::Matrix3d& r) noexcept {
+  return r.transpose().lazyProduct(r) - Eigen::Matrix3d::Identity();
+}
+
+}  // namespace
+
 bool is_pose(const PoseMatrix& matrix) noexcept {
   if (!detail::finite(matrix)) return false;
   if (matrix.row(3) != Eigen::RowVector4d(0.0, 0.0, 0.0, 1.0)) return false;
   const Eigen::Matrix3d r = matrix.topLeftCorner<3, 3>();
-  return (r.transpose() * r - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() <= 1e-6 && r.determinant() > 0.0;
+  return defect_of(r).cwiseAbs().maxCoeff() <= kRotationTolerance && r.determinant() > 0.0;
+}
+
+Eigen::Matrix3d nearest_rotation(Eigen::Matrix3d matrix) noexcept {
+  // Each step squares the defect: 1e-3, 1e-6, 1e-12, rounding.
+  for (int i = 0; i < 4; ++i) {
+    const Eigen::Matrix3d defect = defect_of(matrix);
+    if (defect.cwiseAbs().maxCoeff() < 1e-14) break;
+    const Eigen::Matrix3d change = 0.5 * matrix.lazyProduct(defect);  // the product reads what the difference writes
+    matrix -= change;
+  }
+  return matrix;
+}
+
+Pose nearest_pose(const Pose& pose) noexcept {
+  Pose out = pose;
+  out.linear() = nearest_rotation(pose.linear());
+  return out;
+}
+
+bool is_rough(const Pose& pose) noexcept {
+  return defect_of(pose.linear()).cwiseAbs().maxCoeff() > 2e-9;  // a change of R by δ is a defect of 2 δ
 }
 
 }  // namespace sigmaik

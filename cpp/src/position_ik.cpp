@@ -46,10 +46,11 @@ PositionIk::PositionIk(const Chain& chain, const PositionIkOptions& options)
 const Chain& PositionIk::chain() const noexcept { return model_->chain; }
 const PositionIkOptions& PositionIk::options() const noexcept { return model_->options; }
 
-PositionIkResult PositionIk::solve(const Pose& pose) const noexcept {
+PositionIkResult PositionIk::solve(const Pose& asked) const noexcept {
   const Clock::time_point start = Clock::now();
   const Model& m = *model_;
-  if (!acceptable(pose)) return {};
+  if (!acceptable(asked)) return {};
+  const Pose pose = nearest_pose(asked);
   const Descent search(m.problem, pose);
   Branches found(m.problem, kApart);
   m.closed_form_branches(search, pose, nullptr, found);
@@ -72,17 +73,18 @@ PositionIkResult PositionIk::solve(const Pose& pose, const JointRef& near) const
   if (!acceptable(pose) || near.size() != m.chain.dof() || !near.allFinite()) return {};
   if (near.cwiseAbs().maxCoeff() > kLargest) return {};
   const JointVector from = near;
-  detail::NearestSearch search(*this, pose, from);
+  detail::NearestSearch search(*this, nearest_pose(pose), from);
   while (!search.advance()) {
   }
   DescentPoint point = search.best();
   return m.result(search.descent(), point, from, start);
 }
 
-std::vector<PositionIkBranch> PositionIk::solve_all(const Pose& pose) const {
+std::vector<PositionIkBranch> PositionIk::solve_all(const Pose& asked) const {
   const Model& m = *model_;
-  require(acceptable(pose), "solve_all: the pose is not finite, is farther away than ", kLargest,
+  require(acceptable(asked), "solve_all: the pose is not finite, is farther away than ", kLargest,
           " m, or has a rotation that is none");
+  const Pose pose = nearest_pose(asked);
   const Descent search(m.problem, pose), local(m.on_turn, pose);
   Branches found(m.problem, kApart), distinct(m.problem, m.redundant() ? kApartRedundant : kApart);
   if (!m.closed_form_branches(search, pose, nullptr, found)) m.search_all(search, pose, m.options.starts, found);

@@ -188,8 +188,10 @@ ServoStep Servo::stop(Status status) noexcept {
   return step;
 }
 
-ServoStep Servo::update(const Pose& target, const Twist& feedforward) noexcept {
-  if (!is_pose(target.matrix()) || !detail::finite(feedforward)) return stop(Status::BadInput);
+ServoStep Servo::update(const Pose& asked, const Twist& feedforward) noexcept {
+  if (!is_pose(asked.matrix()) || !detail::finite(feedforward)) return stop(Status::BadInput);
+  if (is_rough(asked)) ++rough_targets_;
+  const Pose target = nearest_pose(asked);
   const Twist error = pose_error(measured_ ? measured_tip_ : state_.tip, target);
   Twist twist = error;
   detail::shorten(twist.head<3>(), max_linear_error_);
@@ -228,6 +230,19 @@ ServoStep Servo::update_twist(const Twist& twist) noexcept {
   expect_motion();
   forget_guide();
   return resolve(twist, nullptr, qdot_start_.size() != 0 && !qdot_start_.isZero(0.0), nullptr);
+}
+
+ServoStep Servo::update_twist(const Twist& twist, Frame frame, const Eigen::Vector3d& point) noexcept {
+  const Pose& tip = measured_ ? measured_tip_ : state_.tip;
+  Twist at_tip = twist;
+  Eigen::Vector3d from_tip = point - tip.translation();
+  if (frame == Frame::Tool) {
+    at_tip.head<3>() = tip.linear() * twist.head<3>();
+    at_tip.tail<3>() = tip.linear() * twist.tail<3>();
+    from_tip = tip.linear() * point;
+  }
+  at_tip.head<3>() -= at_tip.tail<3>().cross(from_tip);
+  return update_twist(at_tip);
 }
 
 // A slice of the guide's work. Returns where the joints go; null: the servo goes its own way.

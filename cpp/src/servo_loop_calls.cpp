@@ -106,7 +106,7 @@ void ServoLoop::start() {
   commands_.post({});
   measurements_.fetch();  // what was measured before
   ending_ = following_ = false;
-  cycles_ = missed_ = unread_ = sink_errors_ = worst_delay_ = ended_ = 0;
+  cycles_ = missed_ = unread_ = sink_errors_ = rough_targets_ = worst_delay_ = ended_ = 0;
   measured_ = 0;
   rested_ = 0;
   make_thread();
@@ -297,7 +297,8 @@ void ServoLoop::command(const Command& command, LoopToken token) {
 
 void ServoLoop::follow(const Pose& target, double timeout, LoopToken token) {
   require(is_pose(target.matrix()), "the target is not a pose");
-  command({LoopCommand::FollowPose, deadline(timeout), target, Twist::Zero()}, token);
+  command({LoopCommand::FollowPose, deadline(timeout), nearest_pose(target), Twist::Zero()}, token);
+  if (is_rough(target)) rough_targets_.fetch_add(1, std::memory_order_relaxed);
 }
 
 void ServoLoop::follow_twist(const Twist& twist, double timeout, LoopToken token) {
@@ -395,6 +396,7 @@ LoopStatistics ServoLoop::statistics() const noexcept {
   LoopStatistics s;
   s.cycles = cycles_.load(std::memory_order_relaxed);
   s.missed = missed_.load(std::memory_order_relaxed);
+  s.rough_targets = rough_targets_.load(std::memory_order_relaxed);
   s.unread = unread_.load(std::memory_order_relaxed);
   s.sink_errors = sink_errors_.load(std::memory_order_relaxed);
   s.worst_delay = 1e-9 * static_cast<double>(worst_delay_.load(std::memory_order_relaxed));

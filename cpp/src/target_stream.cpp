@@ -24,10 +24,6 @@ void check(const char* what, double value, bool zero_allowed) {
           " must be finite and ", zero_allowed ? "at least" : "above", " 0");
 }
 
-Matrix3d normalised(const Matrix3d& rotation) noexcept {
-  return Eigen::Quaterniond(rotation).normalized().toRotationMatrix();
-}
-
 void bound(Twist& twist, const TargetStreamOptions& options) noexcept {
   detail::shorten(twist.head<3>(), options.max_speed);
   detail::shorten(twist.tail<3>(), options.max_angular_speed);
@@ -182,8 +178,7 @@ void TargetStream::reset() noexcept {
 void TargetStream::reset(const Pose& start) {
   require(is_pose(start.matrix()), "start is not a pose");
   reset();
-  last_.pose.translation() = start.translation();
-  last_.pose.linear() = normalised(start.linear());
+  last_.pose = nearest_pose(start);
   placed_ = true;
 }
 
@@ -203,8 +198,8 @@ SampleStatus TargetStream::push(double time, const Pose& pose) noexcept {
   }
   Sample next;
   next.time = time;
-  next.pose.translation() = pose.translation();
-  next.pose.linear() = normalised(pose.linear());
+  next.pose = nearest_pose(pose);
+  if (is_rough(pose)) ++counts_.rough;
 
   if (count_ == 0) {
     start(next);
@@ -287,7 +282,7 @@ void TargetStream::correct(const Sample& next) noexcept {
   const Eigen::Vector2d k = gains(linear_, options_.noise_linear, options_.acceleration_linear);
   const Eigen::Vector2d h = gains(angular_, options_.noise_angular, options_.acceleration_angular);
   estimate_.pose.translation() = ahead.translation() + k[0] * innovation.head<3>();
-  estimate_.pose.linear() = normalised(rotation_exp(h[0] * innovation.tail<3>()) * ahead.linear());
+  estimate_.pose.linear() = nearest_rotation(rotation_exp(h[0] * innovation.tail<3>()) * ahead.linear());
   twist.head<3>() += k[1] * innovation.head<3>();
   twist.tail<3>() += h[1] * innovation.tail<3>();
   bound(twist, options_);
@@ -440,7 +435,7 @@ void TargetStream::approach(const Motion& then, const Motion& now, double dt) no
                     turn_left.acceleration + turn_left.rate.cross(carried_now) + turned * now.acceleration.tail<3>()};
   if (!move(linear, shift, options_.max_speed)) next.translation() = last_.pose.translation() + way.head<3>();
   if (!move(angular, swing, options_.max_angular_speed)) {
-    next.linear() = normalised(rotation_exp(way.tail<3>()) * last_.pose.linear());
+    next.linear() = nearest_rotation(rotation_exp(way.tail<3>()) * last_.pose.linear());
   }
   last_.pose = next;
 }

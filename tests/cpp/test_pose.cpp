@@ -193,7 +193,7 @@ TEST_CASE("what is a pose") {
     bad.col(random.integer(0, 2)) *= -1.0;  // a reflection
     CHECK_FALSE(sigmaik::is_pose(bad));
     bad = good;
-    bad.topLeftCorner<3, 3>() *= 1.0 + 1e-5;
+    bad.topLeftCorner<3, 3>() *= 1.0 + 1e-3;
     CHECK_FALSE(sigmaik::is_pose(bad));
     bad = good;
     bad(3, random.integer(0, 3)) += 1e-9;
@@ -203,4 +203,44 @@ TEST_CASE("what is a pose") {
     CHECK(sigmaik::is_pose(near));
   }
   CHECK_FALSE(sigmaik::is_pose(Eigen::Matrix4d::Zero()));
+}
+
+TEST_CASE("a matrix that is a rotation but for rounding becomes the nearest rotation") {
+  Random random(9);
+  int rough = 0;
+  for (int i = 0; i < 2000; ++i) {
+    const sigmaik::Pose good = random.pose();
+    Eigen::Matrix4d matrix = good.matrix();
+    const double size = random.decades(-12.0, -3.6);
+    switch (i % 4) {
+      case 0: matrix = (matrix * 1e5).array().round().matrix() * 1e-5; break;               // five digits
+      case 1: matrix.topLeftCorner<3, 3>() *= 1.0 + 4.9e-4 * random.uniform(-1, 1); break;  // of a quaternion
+      case 2: matrix.topLeftCorner<3, 3>() += size * random.matrix(3, 3).cwiseMax(-2.0).cwiseMin(2.0); break;
+      default: {
+        Eigen::Matrix4f product = Eigen::Matrix4f::Identity();
+        for (int k = 0; k < 50; ++k) product = product * random.pose().matrix().cast<float>();
+        matrix.topLeftCorner<3, 3>() = product.topLeftCorner<3, 3>().cast<double>();
+      }
+    }
+    if (!sigmaik::is_pose(matrix)) {
+      CHECK(i % 4 == 2);  // nine errors of the same sign
+      continue;
+    }
+    sigmaik::Pose given;
+    given.matrix() = matrix;
+    const sigmaik::Pose pose = sigmaik::nearest_pose(given);
+    const Eigen::Matrix3d r = pose.linear();
+    CHECK((r.transpose() * r - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() < 1e-14);
+    CHECK(r.determinant() > 0.0);
+    CHECK(pose.translation() == given.translation());
+    Eigen::Matrix3d polar = given.linear();  // by Higham's iteration, which is another one
+    for (int k = 0; k < 8; ++k) polar = 0.5 * (polar + Eigen::Matrix3d(polar.inverse().transpose()));
+    CHECK((r - polar).cwiseAbs().maxCoeff() < 1e-14);
+    const double change = (r - given.linear()).cwiseAbs().maxCoeff();
+    if (change > 1e-8) CHECK(sigmaik::is_rough(given));
+    if (change < 1e-10) CHECK_FALSE(sigmaik::is_rough(given));
+    rough += sigmaik::is_rough(given) ? 1 : 0;
+    CHECK(sigmaik::nearest_pose(pose).matrix() == pose.matrix());
+  }
+  CHECK(rough > 1000);
 }

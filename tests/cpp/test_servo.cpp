@@ -648,6 +648,69 @@ TEST_CASE("twists are exact away from singularities") {
   }
 }
 
+TEST_CASE("a twist in the tool's axes, and about another point, moves this point as asked") {
+  for (const auto& [key, chain] : arms()) {
+    const std::string& name = key;
+    CAPTURE(name);
+    Random random(15);
+    for (int repeat = 0; repeat < 50; ++repeat) {
+      const JointVector start = regular_configuration(random, chain);
+      const Pose tip = pose(chain, start);
+      const Twist asked = 0.02 * random.unit(6);
+      const Eigen::Vector3d offset = 0.3 * random.unit(3);
+      Servo servo(chain, JParse{0.01}, scaled_options());
+      const auto achieved = [&](Frame frame, const Eigen::Vector3d& point) {
+        servo.reset(start);
+        return servo.update_twist(asked, frame, point).achieved_twist;
+      };
+      // v at the point is v at the tip + ω × the way from the tip.
+      Twist seen = achieved(Frame::Base, offset);
+      const Eigen::Vector3d way = offset - tip.translation(), omega = seen.tail<3>();
+      servo.reset(start);
+      if (servo.update_twist(asked, Frame::Base, offset).status != Status::Ok) continue;
+      CHECK((seen.head<3>() + omega.cross(way) - asked.head<3>()).norm() < 1e-9);
+      CHECK((omega - asked.tail<3>()).norm() < 1e-9);
+      seen = achieved(Frame::Tool, offset);
+      const Eigen::Vector3d in_base = tip.linear() * offset, turning = seen.tail<3>();
+      servo.reset(start);
+      if (servo.update_twist(asked, Frame::Tool, offset).status != Status::Ok) continue;
+      CHECK((tip.linear().transpose() * (seen.head<3>() + turning.cross(in_base)) - asked.head<3>()).norm() < 1e-9);
+      CHECK((tip.linear().transpose() * turning - asked.tail<3>()).norm() < 1e-9);
+      // The tip's origin in base axes is the twist as it is.
+      servo.reset(start);
+      const JointVector plain = servo.update_twist(asked).qdot;
+      servo.reset(start);
+      CHECK((servo.update_twist(asked, Frame::Base, tip.translation()).qdot - plain).norm() < 1e-12);
+    }
+    Servo servo(chain, JParse{}, scaled_options());
+    servo.reset(regular_configuration(random, chain));
+    CHECK(servo.update_twist(Twist::Zero(), Frame::Tool, {kNan, 0.0, 0.0}).status == Status::BadInput);
+  }
+}
+
+TEST_CASE("a target whose rotation is rounded counts as the nearest pose") {
+  const Chain& chain = arms().at("ur10");
+  Random random(16);
+  for (int repeat = 0; repeat < 100; ++repeat) {
+    const JointVector start = regular_configuration(random, chain);
+    Pose rounded = pose(chain, JointVector(start + 0.1 * random.vector(6)));
+    rounded.linear() = (rounded.linear() * 1e5).array().round().matrix() * 1e-5;
+    Servo servo(chain, JParse{}), other(chain, JParse{});
+    servo.reset(start);
+    other.reset(start);
+    for (int cycle = 0; cycle < 5; ++cycle) {
+      const ServoStep step = servo.update(rounded);
+      CHECK(step.status != Status::BadInput);
+      CHECK(step.qdot == other.update(sigmaik::nearest_pose(rounded)).qdot);
+    }
+    CHECK(servo.rough_targets() == 5);
+    CHECK(other.rough_targets() == 0);
+    rounded.linear() *= 1.001;
+    CHECK(servo.update(rounded).status == Status::BadInput);
+    CHECK(servo.rough_targets() == 5);
+  }
+}
+
 TEST_CASE("zero commands: nothing moves, and the status is Ok") {
   Random random(14);
   for (const auto& [name, chain] : arms()) {

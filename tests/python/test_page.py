@@ -393,9 +393,14 @@ def test_the_end_of_the_server_saves_the_recording(page, browsers, caplog):
 
 
 PROGRAM = """
-import sys, threading, time
+import signal, sys, threading, time
 from sigmaik.teleop import page
 from sigmaik_lab.__main__ import main
+
+# The tests may run where these signals are ignored, as under nohup.
+signal.signal(signal.SIGINT, signal.default_int_handler)
+signal.signal(signal.SIGTERM, signal.SIG_DFL)
+signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 class Recorded(page.Page):
     def __init__(self, *arguments, **options):

@@ -618,3 +618,51 @@ def test_avoidance_refuses(options, text):
 def test_avoidance_by_potential_needs_known_sets():
     with pytest.raises(sk.Error, match="not known"):
         sk.Servo(sk.robots.load("ufactory_xarm7"), sk.JParse(), avoid="potential")
+
+
+def test_a_jog_device_sends_twists_in_the_axes_of_the_tool():
+    arm = sk.robots.load("ur10")
+    servo = sk.Servo(arm)
+    servo.reset([0.0, -1.2, 1.5, -1.87, -1.57, 0.0])
+    before = servo.pose
+    for _ in range(500):
+        servo.update_twist([0, 0, 0.1, 0, 0, 0], frame="tool")
+    way = servo.pose[:3, 3] - before[:3, 3]
+    np.testing.assert_allclose(before[:3, :3].T @ way, [0, 0, np.linalg.norm(way)], atol=1e-4)
+    assert np.linalg.norm(way) > 0.04
+    # A turn about a point 0.2 m before the tool leaves this point in its place.
+    point = servo.pose @ [0, 0, 0.2, 1]
+    for _ in range(300):
+        servo.update_twist([0, 0, 0, 0.3, 0, 0], frame="tool", point=[0, 0, 0.2])
+    np.testing.assert_allclose(servo.pose @ [0, 0, 0.2, 1], point, atol=1e-4)
+    with pytest.raises(sk.Error, match="frame"):
+        servo.update_twist(np.zeros(6), frame="world")
+    with pytest.raises(sk.Error, match="point"):
+        servo.update_twist(np.zeros(6), point=[0, 0])
+
+
+@pytest.mark.parametrize("kind", ["5 digits", "6 digits", "float32 products", "quaternion"])
+def test_a_rotation_that_is_one_but_for_rounding_is_taken_and_counted(kind):
+    arm = sk.robots.load("ur10")
+    servo = sk.Servo(arm)
+    q = np.array([0.0, -1.2, 1.5, -1.87, -1.57, 0.0])
+    rng = np.random.default_rng(3)
+    servo.reset(q)
+    for _ in range(50):
+        exact = arm.pose(q + 0.1 * rng.normal(size=6))
+        target = exact.copy()
+        if "digits" in kind:
+            target = np.round(exact, int(kind[0]))
+        elif kind == "quaternion":
+            target[:3, :3] *= 1.0 + rng.choice([-1, 1]) * 2e-4  # of a quaternion whose length is off by 1e-4
+        else:
+            product = np.eye(4, dtype=np.float32)
+            for _ in range(50):
+                product = product @ arm.pose(q + rng.normal(size=6)).astype(np.float32)
+            target[:3, :3] = product[:3, :3]
+        assert servo.update(target).status != sk.Status.BAD_INPUT
+    assert servo.rough_targets == 50
+    servo.update(arm.pose(q))
+    assert servo.rough_targets == 50
+    with pytest.raises(sk.Error, match="not a rotation"):
+        servo.update(np.diag([1.01, 1.01, 1.01, 1.0]))

@@ -24,7 +24,23 @@ Eigen::Vector3d rotation_log_rate(const Eigen::Vector3d& vector, const Eigen::Ve
 /// axis-angle vector of R_target R_currentᵀ; both in base axes.
 Twist pose_error(const Pose& current, const Pose& target) noexcept;
 
-/// Whether all entries are finite, the last row is 0 0 0 1, and R is a rotation (RᵀR = I within 1e-6, det R > 0).
+/// By how much an entry of RᵀR may differ from I in a matrix that is taken for a rotation: numbers written with four
+/// digits, products of many float32 rotations, and quaternions whose length is off by 2e-4 are within this tolerance.
+/// The functions that take a pose go on with the nearest rotation.
+inline constexpr double kRotationTolerance = 1e-3;
+
+/// Whether all entries are finite, the last row is 0 0 0 1, and R is a rotation (RᵀR = I within kRotationTolerance,
+/// det R > 0).
 bool is_pose(const PoseMatrix& matrix) noexcept;
+
+/// The rotation nearest to R, in the sense of Frobenius' norm: the polar factor of R, by Newton's method. R must be a
+/// rotation within kRotationTolerance; a rotation within 1e-14 stays as it is, bit by bit.
+Eigen::Matrix3d nearest_rotation(Eigen::Matrix3d matrix) noexcept;
+
+/// The pose with the same origin and the nearest rotation, of a matrix that is_pose() accepts.
+Pose nearest_pose(const Pose& pose) noexcept;
+
+/// Whether nearest_pose() changes the rotation by more than 1e-9, that is by more than rounding.
+bool is_rough(const Pose& pose) noexcept;
 
 }  // namespace sigmaik

@@ -200,7 +200,7 @@ class Servo {
   const JointVector& following_error() const noexcept { return following_error_; }
 
   /// One cycle towards a pose of the tip in base. Real time. A target that is not a pose is refused: BadInput, and the
-  /// arm stops.
+  /// arm stops. A rotation within kRotationTolerance is made one (nearest_pose()), and counted where is_rough().
   /// \param feedforward twist [v; ω] of a target that moves, base axes, at the target's origin; added to gain × error,
   ///     after the error's caps. Behind a target of constant twist the tip lags by speed/gain without the feedforward,
   ///     and not at all with it.
@@ -208,6 +208,13 @@ class Servo {
 
   /// One cycle along a twist [v; ω], base axes, at the tip's origin. Real time.
   ServoStep update_twist(const Twist& twist) noexcept;
+  /// One cycle along a twist [v; ω] of another point, or in the tool's axes, as jog devices send it. Real time.
+  /// \param frame the axes of the twist and of `point`
+  /// \param point [m] that moves at v: in base where the axes are the base's; from the tip's origin where they are the
+  ///     tool's, so that zero is the tip's origin
+  ServoStep update_twist(const Twist& twist, Frame frame, const Eigen::Vector3d& point) noexcept;
+  /// Targets of update() since the servo was made whose rotation was off by more than rounding, and was made one.
+  std::int64_t rough_targets() const noexcept { return rough_targets_; }
 
   /// One cycle of the fastest stop that the limits allow, or of rest: Holding; before reset() BadInput. Real time.
   ServoStep hold() noexcept { return stop(Status::Holding); }
@@ -300,6 +307,7 @@ class Servo {
   JointVector expected_error_;  // the following error of a resting arm that nobody has moved since
   JointVector last_way_;        // the fastest q̇ since the motion turned round last
   int reversals_ = 0;
+  std::int64_t rough_targets_ = 0;
   Pose measured_tip_ = Pose::Identity(), last_target_ = Pose::Identity();
   double max_linear_error_;
   double fade_ = 1.0, rested_ = 0.0;

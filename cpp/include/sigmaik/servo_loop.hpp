@@ -82,12 +82,13 @@ struct LoopSample {
 
 /// Counts and times of a loop since its start.
 struct LoopStatistics {
-  std::int64_t cycles = 0;       ///< cycles done
-  std::int64_t missed = 0;       ///< cycles left out, because their time had passed
-  std::int64_t unread = 0;       ///< samples lost, because no read() came in time
-  std::int64_t sink_errors = 0;  ///< exceptions of the sink
-  double worst_delay = 0.0;      ///< [s] from when a cycle was due to its start
-  double elapsed = 0.0;          ///< [s] since start(), or from start() to stop()
+  std::int64_t cycles = 0;         ///< cycles done
+  std::int64_t missed = 0;         ///< cycles left out, because their time had passed
+  std::int64_t unread = 0;         ///< samples lost, because no read() came in time
+  std::int64_t sink_errors = 0;    ///< exceptions of the sink
+  std::int64_t rough_targets = 0;  ///< poses of follow() whose rotation was made one, see is_rough()
+  double worst_delay = 0.0;        ///< [s] from when a cycle was due to its start
+  double elapsed = 0.0;            ///< [s] since start(), or from start() to stop()
   /// Cycles per second [1/s].
   double rate() const noexcept { return elapsed > 0.0 ? static_cast<double>(cycles) / elapsed : 0.0; }
 };
@@ -297,7 +298,8 @@ class ServoLoop {
   std::atomic<std::int8_t> fault_{0};  // LoopFaultKind; while this is 0, cause_ is the loop's, else the callers'
   Cause cause_;
 
-  std::atomic<std::int64_t> begun_{0}, ended_{0}, cycles_{0}, missed_{0}, unread_{0}, sink_errors_{0}, worst_delay_{0};
+  std::atomic<std::int64_t> begun_{0}, ended_{0}, cycles_{0}, missed_{0}, unread_{0}, sink_errors_{0},
+      rough_targets_{0}, worst_delay_{0};
 };
 
 SIGMAIK_SAME_LAYOUT(ServoLoop, ServoLoopOptions, LoopSample, LoopStatistics);

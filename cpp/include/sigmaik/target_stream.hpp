@@ -52,6 +52,7 @@ struct SampleCounts {
   std::int64_t outliers = 0;      ///< samples of SampleStatus::Outlier
   std::int64_t out_of_order = 0;  ///< samples of SampleStatus::OutOfOrder
   std::int64_t invalid = 0;       ///< samples of SampleStatus::Invalid
+  std::int64_t rough = 0;         ///< samples whose rotation was made one, see is_rough()
 };
 
 /// The state of the stream, ordered from the best to the worst.
