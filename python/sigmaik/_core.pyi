@@ -832,9 +832,12 @@ class Servo:
             a target of constant twist the tip lags by speed/gain without it, and not at all with it.
         Raises Error, and holds, where the target is not a pose.
         """
-    def update_twist(self, twist: numpy.typing.ArrayLike) -> ServoStep:
+    def update_twist(self, twist: numpy.typing.ArrayLike, frame: str = 'base', point: numpy.typing.ArrayLike | None = None) -> ServoStep:
         """
-        One cycle along a twist (6,) [v; ω], base axes, at the tip's origin.
+        One cycle along a twist (6,) [v; ω].
+
+        frame: the axes of twist and point, 'base' or 'tool'; jog devices send 'tool'.
+        point: (3,) [m] that moves at v: in base, or with frame='tool' from the tip's origin. None: the tip's origin.
         """
     @property
     def chain(self) -> Chain:
@@ -876,6 +879,11 @@ class Servo:
     def q(self) -> numpy.typing.NDArray[numpy.float64]:
         """
         (n,) where the reference stands.
+        """
+    @property
+    def rough_targets(self) -> int:
+        """
+        Targets of update() whose rotation was off by more than rounding (up to 1e-3 in RᵀR), and was made one.
         """
     @property
     def settling_time(self) -> float:
@@ -974,6 +982,11 @@ class LoopStatistics:
     def rate(self) -> float:
         """
         [Hz] cycles a second.
+        """
+    @property
+    def rough_targets(self) -> int:
+        """
+        Poses of follow() whose rotation was off by more than rounding, and was made one.
         """
     @property
     def sink_errors(self) -> int:
@@ -1171,6 +1184,11 @@ class SampleCounts:
     @property
     def relocated(self) -> int:
         ...
+    @property
+    def rough(self) -> int:
+        """
+        Samples whose rotation was off by more than rounding.
+        """
 class Target:
     """
     Where to be now, and how to move: servo.update(target.pose, target.twist).
