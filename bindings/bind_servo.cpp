@@ -180,7 +180,7 @@ void bind_cycle(py::class_<Servo>& c) {
           "point: (3,) [m] that moves at v: in base, or with frame='tool' from the tip's origin. None: the tip's "
           "origin.")
       .def_property_readonly("rough_targets", &Servo::rough_targets,
-                             "Targets of update() whose rotation was off by more than rounding (up to 1e-3 in RᵀR), "
+                             "Targets of update() whose rotation was off by more than rounding (up to 5e-4 in RᵀR), "
                              "and was made one.")
       .def("hold", &Servo::hold, "One cycle of the fastest stop that the limits allow, or of rest: HOLDING.")
       .def("continue_from", &Servo::continue_from, py::arg("other"),

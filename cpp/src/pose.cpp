@@ -78,7 +78,7 @@ bool is_pose(const PoseMatrix& matrix) noexcept {
 }
 
 Eigen::Matrix3d nearest_rotation(Eigen::Matrix3d matrix) noexcept {
-  // Each step squares the defect: 1e-3, 1e-6, 1e-12, rounding.
+  // Each step squares the defect: 5e-4, 2e-7, 3e-14, rounding.
   for (int i = 0; i < 4; ++i) {
     const Eigen::Matrix3d defect = defect_of(matrix);
     if (defect.cwiseAbs().maxCoeff() < 1e-14) break;

@@ -630,6 +630,8 @@ def test_a_jog_device_sends_twists_in_the_axes_of_the_tool():
     way = servo.pose[:3, 3] - before[:3, 3]
     np.testing.assert_allclose(before[:3, :3].T @ way, [0, 0, np.linalg.norm(way)], atol=1e-4)
     assert np.linalg.norm(way) > 0.04
+    while servo.hold().qdot.any():
+        pass
     # A turn about a point 0.2 m before the tool leaves this point in its place.
     point = servo.pose @ [0, 0, 0.2, 1]
     for _ in range(300):
