@@ -83,7 +83,7 @@ Twist twist_argument(py::handle object, const char* what) {
   return Eigen::Map<const Twist>(array_argument(object, what, {6}, "(6,): [v; ω]").data());
 }
 
-Eigen::Vector3d point_argument(py::handle object, const char* what) {
+Eigen::Vector3d vector_argument(py::handle object, const char* what) {
   return Eigen::Map<const Eigen::Vector3d>(array_argument(object, what, {3}, "(3,)").data());
 }
 

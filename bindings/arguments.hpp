@@ -65,8 +65,8 @@ JointVector optional_joint_argument(py::handle object, const char* what, int n);
 
 Twist twist_argument(py::handle object, const char* what);
 
-/// (3,) [m]
-Eigen::Vector3d point_argument(py::handle object, const char* what);
+/// (3,)
+Eigen::Vector3d vector_argument(py::handle object, const char* what);
 
 /// 4×4, or what carries one: pinocchio's SE3 (.homogeneous), spatialmath's SE3 (.A), jaxlie's and mink's SE3
 /// (.as_matrix()).

@@ -66,8 +66,7 @@ void bind_inertia(py::module_& m) {
       .def(py::init([](double mass, const ArrayLike& center_of_mass, const MaybeArray& tensor) {
              Inertia inertia;
              inertia.mass = mass;
-             inertia.center_of_mass = Eigen::Map<const Eigen::Vector3d>(
-                 array_argument(center_of_mass, "center_of_mass", {3}, "(3,)").data());
+             inertia.center_of_mass = vector_argument(center_of_mass, "center_of_mass");
              if (tensor) {
                const Array array = array_argument(*tensor, "tensor", {3, 3}, "(3, 3)");
                inertia.tensor = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(array.data());

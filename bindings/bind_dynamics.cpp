@@ -19,8 +19,7 @@ struct Fields<ComputedTorqueOptions> {
 namespace {
 
 Eigen::Vector3d gravity_argument(const MaybeArray& gravity, const Eigen::Vector3d& otherwise) {
-  if (!gravity) return otherwise;
-  return Eigen::Map<const Eigen::Vector3d>(array_argument(*gravity, "gravity", {3}, "(3,)").data());
+  return gravity ? vector_argument(*gravity, "gravity") : otherwise;
 }
 
 void bind_rigid_body(py::module_& m) {

@@ -29,9 +29,7 @@ DistanceField field_argument(const ArrayLike& distances, const ArrayLike& origin
       throw Error("distances has shape " + shape_text(all) + ", which is absurd");
     shape[static_cast<std::size_t>(axis)] = static_cast<int>(all.shape(axis));
   }
-  const Array at = array_argument(origin, "origin", {3}, "(3,)");
-  return DistanceField({all.data(), all.data() + all.size()}, shape, Eigen::Map<const Eigen::Vector3d>(at.data()),
-                       cell);
+  return DistanceField({all.data(), all.data() + all.size()}, shape, vector_argument(origin, "origin"), cell);
 }
 
 // Calls fill(point, out) for a point (3,), or for every row of points (M, 3) without the GIL; `shape` is that of one

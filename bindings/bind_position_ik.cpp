@@ -59,8 +59,7 @@ struct Argument<ToolCone> {
       throw Error(std::string(what) + " must be a pair: an axis (3,) and an angle [rad]");
     }
     const auto pair = py::reinterpret_borrow<py::sequence>(object);
-    const Array axis = array_argument(py::object(pair[0]), "the axis of the cone", {3}, "(3,)");
-    return {Eigen::Vector3d(Eigen::Map<const Eigen::Vector3d>(axis.data())),
+    return {vector_argument(py::object(pair[0]), "the axis of the cone"),
             Argument<double>::from(py::object(pair[1]), "the angle of the cone")};
   }
   static py::object to(const ToolCone& value) { return py::make_tuple(to_numpy(value.axis), value.angle); }

@@ -169,7 +169,7 @@ void bind_cycle(py::class_<Servo>& c) {
             const Twist asked = twist_argument(twist, "twist");
             if (frame == "base" && !point) return checked(s.update_twist(asked));
             const Frame axes = task_argument(py::none(), frame).frame;
-            const Eigen::Vector3d at = point                 ? point_argument(*point, "point")
+            const Eigen::Vector3d at = point                 ? vector_argument(*point, "point")
                                        : axes == Frame::Tool ? Eigen::Vector3d(Eigen::Vector3d::Zero())
                                                              : Eigen::Vector3d(s.tip().translation());
             return checked(s.update_twist(asked, axes, at));

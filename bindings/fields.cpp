@@ -78,7 +78,7 @@ std::string Argument<Eigen::Vector3d>::text(const Eigen::Vector3d& value) {
 }
 
 Eigen::Vector3d Argument<Eigen::Vector3d>::from(py::handle object, const char* what) {
-  return Eigen::Map<const Eigen::Vector3d>(array_argument(object, what, {3}, "(3,)").data());
+  return vector_argument(object, what);
 }
 
 std::vector<py::handle> Signature::sort(const py::args& args, const py::kwargs& kwargs) const {

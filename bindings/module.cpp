@@ -41,11 +41,7 @@ void bind_status(py::module_& m) {
       [](const ArrayLike& rotation) { return to_numpy(rotation_log(rotation_argument(rotation, "rotation"))); },
       py::arg("rotation"), "Axis times angle [rad] (3,) of a 3×3 rotation, angle in [0, π].");
   m.def(
-      "rotation_exp",
-      [](const ArrayLike& vector) {
-        const Array array = array_argument(vector, "vector", {3}, "(3,)");
-        return to_numpy(rotation_exp(Eigen::Map<const Eigen::Vector3d>(array.data())));
-      },
+      "rotation_exp", [](const ArrayLike& vector) { return to_numpy(rotation_exp(vector_argument(vector, "vector"))); },
       py::arg("vector"), "Rotation (3, 3) about `vector` by its length [rad].");
 }
 
