@@ -18,6 +18,7 @@
 #include <sigmaik/position_ik.hpp>
 
 #include "arms.hpp"
+#include "configurations.hpp"
 #include "heap.hpp"
 #include "numbers.hpp"
 #include "random.hpp"
@@ -38,9 +39,11 @@ using sigmaik::PositionIkResult;
 using sigmaik::PositionIkStatus;
 using sigmaik::Segment;
 using sigmaik::Twist;
+using test::inside;
 using test::kInfinity;
 using test::kNan;
 using test::Random;
+using test::sample;
 
 constexpr double kPi = std::numbers::pi;
 
@@ -48,23 +51,9 @@ static_assert(noexcept(std::declval<const PositionIk&>().solve(std::declval<cons
 static_assert(noexcept(std::declval<const PositionIk&>().solve(std::declval<const Pose&>(),
                                                                std::declval<const sigmaik::JointRef&>())));
 
-bool inside(const Chain& chain, const JointVector& q) {
-  return (q.array() >= chain.limits().lower.array()).all() && (q.array() <= chain.limits().upper.array()).all();
-}
-
 bool reaches(const Chain& chain, const JointVector& q, const Pose& target, double tolerance = 1e-6) {
   const Twist error = sigmaik::pose_error(pose(chain, q), target);
   return error.head<3>().norm() <= 1.001 * tolerance && error.tail<3>().norm() <= 1.001 * tolerance;
-}
-
-// Evenly inside the limits, within ±π where there is none.
-JointVector sample(Random& random, const Chain& chain) {
-  JointVector q(chain.dof());
-  for (int i = 0; i < q.size(); ++i) {
-    const double lower = chain.limits().lower[i], upper = chain.limits().upper[i];
-    q[i] = random.uniform(std::isfinite(lower) ? lower : -kPi, std::isfinite(upper) ? upper : kPi);
-  }
-  return q;
 }
 
 // A random arm, with position limits at about half of the joints that do not turn endlessly.

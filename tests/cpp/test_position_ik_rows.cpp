@@ -16,6 +16,7 @@
 
 #include "../../cpp/src/position_ik_rows.hpp"
 #include "arms.hpp"
+#include "configurations.hpp"
 #include "heap.hpp"
 #include "numbers.hpp"
 #include "random.hpp"
@@ -38,28 +39,16 @@ using sigmaik::detail::Matrix6;
 using sigmaik::detail::PoseRows;
 using sigmaik::detail::Row6;
 using sigmaik::detail::RowErrors;
+using test::inside;
 using test::kInfinity;
 using test::kNan;
 using test::Random;
+using test::sample;
 
 constexpr double kPi = std::numbers::pi;
 constexpr double kTolerance = 1.001e-6;
 constexpr std::array<bool, 6> kPosition{true, true, true, false, false, false};
 constexpr std::array<bool, 6> kOrientation{false, false, false, true, true, true};
-
-bool inside(const Chain& chain, const JointVector& q) {
-  return (q.array() >= chain.limits().lower.array()).all() && (q.array() <= chain.limits().upper.array()).all();
-}
-
-// Evenly inside the limits, within ±π where there is none.
-JointVector sample(Random& random, const Chain& chain) {
-  JointVector q(chain.dof());
-  for (int i = 0; i < q.size(); ++i) {
-    const double lower = chain.limits().lower[i], upper = chain.limits().upper[i];
-    q[i] = random.uniform(std::isfinite(lower) ? lower : -kPi, std::isfinite(upper) ? upper : kPi);
-  }
-  return q;
-}
 
 // A random arm with position limits at every joint that does not turn endlessly.
 Chain limited_chain(Random& random, int n, double prismatic) {

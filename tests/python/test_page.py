@@ -4,7 +4,6 @@ import contextlib
 import http.client
 import itertools
 import os
-import resource
 import signal
 import socket
 import subprocess
@@ -443,14 +442,6 @@ def test_a_recording_of_the_command_survives_its_end(tmp_path, end):
     episode = Episode.load(tmp_path / "episode-0000.npz")
     assert len(episode) > max(recorded - 1, 50)
     np.testing.assert_array_equal(episode.play(), episode["q"])
-
-
-@pytest.fixture
-def full_disk():
-    """full_disk(bytes): files cannot become larger, until the end of the test."""
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    yield lambda size: resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
-    resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
 @pytest.mark.parametrize("when", ["before", "meanwhile", "at save"])

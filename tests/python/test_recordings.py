@@ -365,14 +365,6 @@ def test_a_recording_survives_the_end_of_its_program(tmp_path, end):
     np.testing.assert_array_equal(loaded.play(), loaded["q"])
 
 
-@pytest.fixture
-def full_disk():
-    """full_disk(bytes): files cannot become larger, until the end of the test."""
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    yield lambda size: resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
-    resource.setrlimit(resource.RLIMIT_FSIZE, before)
-
-
 def test_a_full_disk_is_told_and_the_recording_goes_on_in_memory(tmp_path, full_disk):
     file = tmp_path / "e.part"
     with Session("ur10", rate=500.0) as session:
