@@ -25,7 +25,9 @@ def arrival_table(rows: Sequence[ArrivalSummary]) -> Table:
     Red: joints that move at the end, and broken limits.
     """
     failures = any(row.failed > 0.0 for row in rows)
-    table = Table("", "arm", "servo")
+    table = Table()
+    table.add_column("arm", wrap=True)  # a narrow terminal breaks the names, and cuts no number
+    table.add_column("servo", wrap=True)
     table.add_numbers("there\n%", "late\n%", "led\n%", "50 %\ns", "90 %\ns", "rest\n%", "over\n", "jump\n×")
     table.add_numbers("off\nmm", "cycle\nµs", *(["error\n%"] if failures else []))
     for i, row in enumerate(rows):
