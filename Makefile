@@ -10,7 +10,7 @@ export SKBUILD_BUILD_DIR := build/python
 export SKBUILD_CMAKE_DEFINE := SIGMAIK_WERROR=$(WERROR)
 
 .NOTPARALLEL:
-.PHONY: help demo docs lint test test-browser test-clang test-asan test-tsan stress bench wheel build install stubs \
+.PHONY: help demo docs lint test test-browser test-ros2 test-clang test-asan test-tsan stress bench wheel build install stubs \
         stubs-check clean system
 
 help:  ## this list
@@ -35,11 +35,14 @@ test: lint build .venv/.test .venv/.package  ## everything: lint, install, stubs
 	tools/stubs.sh --check
 	ctest --test-dir build/release --output-on-failure -j $$(nproc)
 	$(BIN)/python -m pytest -n $$(nproc) --dist worksteal
-	$(MAKE) test-browser docs
+	$(MAKE) test-browser test-ros2 docs
 
 test-browser: .venv/.test .venv/.package  ## the page of `sigmaik teleop` in Chromium, without a screen (part of `make test`)
 	@tools/setup_system.sh $(PYTHON) chromium
 	$(BIN)/python -m pytest tests/browser
+
+test-ros2: .venv/.test .venv/.package  ## the ROS 2 node, in processes of its own (part of `make test`)
+	$(BIN)/python -m pytest tests/ros2
 
 test-clang:  ## everything in C++, and the Python module, compiled by clang; the C++ tests
 test-asan:  ## the C++ tests under the address and undefined-behaviour sanitizers

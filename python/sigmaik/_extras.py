@@ -14,6 +14,8 @@ _REQUIREMENTS = {
     "mujoco": "'mujoco>=3'",
     "optik": "optik-py",
     "placo": "'placo>=0.10'",
+    "rclpy": "ros-rclpy ros-rmw-fastrtps-cpp ros-diagnostic-msgs ros-geometry-msgs ros-sensor-msgs ros-std-srvs "
+    "ros-trajectory-msgs",
     "viser": "'viser>=1'",
 }
 

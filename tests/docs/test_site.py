@@ -12,7 +12,18 @@ from sphinx.util.inventory import InventoryFile
 ROOT = Path(__file__).parents[2]
 SITE = ROOT / "build/docs/html"
 HEADERS = ROOT / "cpp/include/sigmaik"
-MODULES = ["", ".indices", ".methods", ".planning", ".planning.costs", ".robots", ".sim", ".singularities", ".teleop"]
+MODULES = [
+    "",
+    ".indices",
+    ".methods",
+    ".planning",
+    ".planning.costs",
+    ".robots",
+    ".ros2",
+    ".sim",
+    ".singularities",
+    ".teleop",
+]
 
 
 @pytest.fixture(scope="module")

@@ -79,7 +79,7 @@ def test_all_commands_are_found():
         "arrival", "axis5", "cart", "drill", "execute", "limits", "montecarlo", "reach", "reaching", "round-table",
         "solvers", "track",
     }  # fmt: skip
-    assert set(study.names()) - set(STUDIES) == {"info", "robots", "teleop"}
+    assert set(study.names()) - set(STUDIES) == {"info", "robots", "ros2", "ros2-arm", "teleop"}
     for name in study.names():
         first, rest = study.describe(name)
         assert 10 < len(first) < 80
@@ -189,6 +189,11 @@ def test_studies_run_in_a_plain_install(command, tmp_path):
         ("montecarlo --no-plot --solver ipopt", "casadi"),
         ("montecarlo --no-plot --dask tcp://127.0.0.1:1", "'dask[distributed]'"),
         ("teleop", "'viser>=1' yourdfpy"),
+        (
+            "ros2 --robot ur10",
+            "ros-rclpy ros-rmw-fastrtps-cpp ros-diagnostic-msgs ros-geometry-msgs ros-sensor-msgs ros-std-srvs "
+            "ros-trajectory-msgs",
+        ),
     ],
 )  # fmt: skip
 def test_what_is_missing_is_named_with_a_command_that_works(command, hint):

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import argparse
-import contextlib
 import pathlib
-import signal
 import webbrowser
-from collections.abc import Iterator
-from typing import NoReturn
 
 from sigmaik._extras import need
 from sigmaik.teleop.devices import DEVICES
 from sigmaik_lab.options import add_arm
 from sigmaik_lab.output import say
 from sigmaik_lab.runner import parsed, run_study
+from sigmaik_lab.signals import signals_interrupt
 
 __all__ = ["options", "run"]
 
@@ -101,7 +98,7 @@ def run(args: argparse.Namespace) -> int:
         rate=args.rate,
         pose_timeout=args.browser_timeout,
     )
-    with _signals_interrupt(), session:
+    with signals_interrupt(), session:
         page = Page(
             session, args.host, args.port, args.out, not args.no_parquet, packages=packages, names=tuple(args.name)
         )
@@ -128,22 +125,3 @@ def _package(text: str) -> tuple[str, pathlib.Path]:
     if not (name and equals and folder):
         raise ValueError(f"--package must be NAME=DIR, not '{text}'")
     return name, pathlib.Path(folder)
-
-
-@contextlib.contextmanager
-def _signals_interrupt() -> Iterator[None]:
-    """SIGTERM and SIGHUP end the program as Ctrl-C does, so that a recording is saved; nohup's SIGHUP stays ignored."""
-    before = {}
-    for number in (signal.SIGTERM, signal.SIGHUP):
-        with contextlib.suppress(ValueError):  # not in the main thread
-            if signal.getsignal(number) is not signal.SIG_IGN:
-                before[number] = signal.signal(number, _interrupt)
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-
-
-def _interrupt(*_: object) -> NoReturn:
-    raise KeyboardInterrupt
