@@ -39,7 +39,8 @@ void servo_batch(benchmark::State& state) {
       if (state.range(2) != 0) {
         Eigen::Map<Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(rows.data() + 16 * b) = s.pose[at].matrix();
       } else {
-        for (std::size_t i = 0; i < 6; ++i) rows[6 * b + i] = 0.3 * s.twist[static_cast<Eigen::Index>(i)] * ((cycle & 512) != 0 ? -1.0 : 1.0);
+        for (std::size_t i = 0; i < 6; ++i)
+          rows[6 * b + i] = 0.3 * s.twist[static_cast<Eigen::Index>(i)] * ((cycle & 512) != 0 ? -1.0 : 1.0);
       }
     }
     state.ResumeTiming();
@@ -60,7 +61,8 @@ void servo_loop_of_singles(benchmark::State& state) {
   for (auto _ : state) {
     ++cycle;
     for (std::size_t b = 0; b < count; ++b) {
-      benchmark::DoNotOptimize(servos[b].update(s.pose[static_cast<std::size_t>(cycle + static_cast<int>(b)) & (bench::kPath - 1)]));
+      benchmark::DoNotOptimize(
+          servos[b].update(s.pose[static_cast<std::size_t>(cycle + static_cast<int>(b)) & (bench::kPath - 1)]));
     }
   }
   state.SetItemsProcessed(static_cast<std::int64_t>(state.iterations() * count));

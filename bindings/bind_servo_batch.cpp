@@ -74,9 +74,7 @@ class GuardedBatch {
   std::mutex mutex_;
 };
 
-std::span<const double> span_of(const Array& array) {
-  return {array.data(), static_cast<std::size_t>(array.size())};
-}
+std::span<const double> span_of(const Array& array) { return {array.data(), static_cast<std::size_t>(array.size())}; }
 
 // Of the shape (B, …) that is needed; entries that are not finite stop their own row alone.
 Array rows_of(py::handle object, const char* what, std::vector<py::ssize_t> shape) {
@@ -194,11 +192,15 @@ void bind_answers(py::class_<GuardedBatch>& c) {
         },
         doc);
   };
-  array("q", [](ServoBatch& b) { return b.q(); }, {0}, "(B, n) position commands [rad or m]; NaN before the first reset.");
-  array("qdot", [](ServoBatch& b) { return b.qdot(); }, {0}, "(B, n) velocity commands over the last dt [rad/s or m/s].");
+  array(
+      "q", [](ServoBatch& b) { return b.q(); }, {0},
+      "(B, n) position commands [rad or m]; NaN before the first reset.");
+  array(
+      "qdot", [](ServoBatch& b) { return b.qdot(); }, {0}, "(B, n) velocity commands over the last dt [rad/s or m/s].");
   array("status", [](ServoBatch& b) { return b.status(); }, {}, "(B,) int8, a Status for each servo.");
-  array("pose_error", [](ServoBatch& b) { return b.pose_error(); }, {6},
-        "(B, 6) [m, rad] target minus tip before the cycle; zero for twists.");
+  array(
+      "pose_error", [](ServoBatch& b) { return b.pose_error(); }, {6},
+      "(B, 6) [m, rad] target minus tip before the cycle; zero for twists.");
   array("achieved_twist", [](ServoBatch& b) { return b.achieved_twist(); }, {6}, "(B, 6) J q̇ [m/s, rad/s].");
   array("pose", [](ServoBatch& b) { return b.tips(); }, {4, 4}, "(B, 4, 4) the tips in the base, at q.");
 }
@@ -232,8 +234,7 @@ void bind_servo_batch(py::module_& m) {
   def_options(c);
   bind_calls(c);
   bind_answers(c);
-  c.def_property_readonly(
-       "chain", [](const GuardedBatch& self) { return self.first().chain(); })
+  c.def_property_readonly("chain", [](const GuardedBatch& self) { return self.first().chain(); })
       .def_property_readonly("method", [](const GuardedBatch& self) { return self.first().method(); })
       .def_property_readonly(
           "dt", [](const GuardedBatch& self) { return self.options().servo.dt; }, "[s]")

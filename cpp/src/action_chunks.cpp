@@ -89,7 +89,8 @@ ChunkStatus ActionChunks::refuse(ChunkStatus status) noexcept {
 
 // Whether a chunk with these numbers of actions and of poses on its way has come in time and in order.
 ChunkStatus ActionChunks::judge(double stamp, std::size_t actions, std::size_t knots) noexcept {
-  if (!(std::abs(stamp + options_.first) <= kLatest) || actions == 0 || actions > static_cast<std::size_t>(options_.max_actions)) {
+  if (!(std::abs(stamp + options_.first) <= kLatest) || actions == 0 ||
+      actions > static_cast<std::size_t>(options_.max_actions)) {
     return refuse(ChunkStatus::Invalid);
   }
   if (count_ > 0 && stamp <= newest_) return refuse(ChunkStatus::OutOfOrder);

@@ -38,6 +38,7 @@ using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::Ro
 // method whose answer depends on them there is left to the solver of single problems: one that looks at v_i, and any at
 // its threshold, where it may treat the two differently.
 constexpr double kTie = 1e-6;
+constexpr double kExact = 1e-9;  // part of the command that an exact answer may miss, as for a VelocitySolver
 
 // The problems, and what the method needs of their decompositions.
 struct Batch {
@@ -48,7 +49,7 @@ struct Batch {
   const double* twist;
   double* qdot;
   std::int8_t* status;  // may be null
-  bool needs_u;         // the method or the status depends on u_i, not only on u_iᵀẋ
+  bool needs_u;         // the method depends on u_i, not only on u_iᵀẋ
   bool needs_v;         // the method depends on v_i
   double threshold;     // of the method, relative: the answer may jump there
 
@@ -70,8 +71,7 @@ struct Batch {
 
 Batch batch_of(const Method& method, double length_scale, const BatchShape& shape, const double* jacobian,
                const double* twist, double* qdot, std::int8_t* status) noexcept {
-  Batch batch{method, length_scale, shape, jacobian, twist, qdot, status, status != nullptr, false,
-              relative_threshold(method)};
+  Batch batch{method, length_scale, shape, jacobian, twist, qdot, status, false, false, relative_threshold(method)};
   std::visit(
       [&]<typename R>(const R& rule) {
         if constexpr (std::is_same_v<R, CustomRule>) {
@@ -99,11 +99,11 @@ void solve_alone(const Batch& batch, VelocitySolver& solver, std::size_t b) noex
   if (batch.status != nullptr) batch.status[b] = static_cast<std::int8_t>(solution.status);
 }
 
-// One lane of a decomposition: the squares of the orthogonal columns, and their entries.
+// One lane of a decomposition: the lengths of the orthogonal columns, one over each, and their entries.
 struct Lane {
   const double* entries;  // entry j of column i is at (i kLaneEntries + j) stride
   int stride;
-  double square[kMaxTask];
+  double sigma[kMaxTask], inverse[kMaxTask];
 
   double at(int i, int j) const noexcept { return entries[(i * detail::kLaneEntries + j) * stride]; }
 };
@@ -116,7 +116,7 @@ bool answer(const Batch& batch, std::size_t b, const Lane& lane, Spectrum& spect
   std::array<int, 6> order{};
   for (int i = 0; i < k; ++i) {
     int at = i;
-    for (; at > 0 && lane.square[order[static_cast<std::size_t>(at - 1)]] < lane.square[i]; --at) {
+    for (; at > 0 && lane.sigma[order[static_cast<std::size_t>(at - 1)]] < lane.sigma[i]; --at) {
       order[static_cast<std::size_t>(at)] = order[static_cast<std::size_t>(at - 1)];
     }
     order[static_cast<std::size_t>(at)] = i;
@@ -125,7 +125,7 @@ bool answer(const Batch& batch, std::size_t b, const Lane& lane, Spectrum& spect
   double longest = 0.0, last = 0.0;
   for (int i = 0; i < k; ++i) {
     const int from = order[static_cast<std::size_t>(i)];
-    const double sigma = std::sqrt(lane.square[from]);
+    const double sigma = lane.sigma[from];
     if (i == 0) longest = sigma;
     if (std::abs(sigma - batch.threshold * longest) < kTie * longest) return false;
     if (batch.needs_v && i > 0 && last - sigma < kTie * longest) return false;
@@ -134,11 +134,12 @@ bool answer(const Batch& batch, std::size_t b, const Lane& lane, Spectrum& spect
     if (batch.wide()) {
       if (!batch.needs_u) command[i] = lane.at(from, n);
       for (int row = 0; batch.needs_u && row < m; ++row) SpectrumParts::u(spectrum, i)[row] = lane.at(from, n + row);
-      for (int j = 0; batch.needs_v && j < n; ++j) SpectrumParts::v(spectrum, i)[j] = lane.at(from, j) / sigma;
+      for (int j = 0; batch.needs_v && j < n; ++j)
+        SpectrumParts::v(spectrum, i)[j] = lane.at(from, j) * lane.inverse[from];
     } else {
       double part = 0.0;
       for (int row = 0; row < m; ++row) part += lane.at(from, row) * batch.weight(row) * batch.twist_of(b)[row];
-      command[i] = part / sigma;
+      command[i] = part * lane.inverse[from];
       for (int j = 0; batch.needs_v && j < n; ++j) SpectrumParts::v(spectrum, i)[j] = lane.at(from, length + j);
     }
   }
@@ -147,18 +148,20 @@ bool answer(const Batch& batch, std::size_t b, const Lane& lane, Spectrum& spect
   }
   if (!detail::finite(command)) return false;
   const Resolution resolution = resolve(batch.method, spectrum, command, 0b111000);
-  exact = resolution.exact;
+  double largest = 0.0;  // in the rows of the task, as Resolution::exact has it: the basis here may be another
+  for (int row = 0; row < m; ++row) largest = std::max(largest, std::abs(batch.weight(row) * batch.twist_of(b)[row]));
+  exact = !batch.needs_u || resolution.exact;
   for (int i = 0; i < k; ++i) {
     const double speed = resolution.speed[static_cast<std::size_t>(i)];
-    factor[static_cast<std::size_t>(order[static_cast<std::size_t>(i)])] =
-        batch.wide() ? speed / spectrum.sigma(i) : speed;
+    if (!batch.needs_u && !(std::abs(spectrum.sigma(i) * speed - command[i]) <= kExact * largest)) exact = false;
+    const int from = order[static_cast<std::size_t>(i)];
+    factor[static_cast<std::size_t>(from)] = batch.wide() ? speed * lane.inverse[from] : speed;
   }
   return true;
 }
 
 // Whether J q̇ misses no more of the twist than VelocitySolver allows for an exact answer.
 Status judge(const Batch& batch, std::size_t b, bool exact) noexcept {
-  constexpr double kExact = 1e-9;
   double missed = 0.0, largest = 0.0;
   for (int row = 0; row < batch.shape.rows; ++row) {
     const double* const j = batch.jacobian_of(b) + row * batch.shape.cols;
@@ -175,24 +178,26 @@ template <int lanes>
 SIGMAIK_INLINE void load_lane(const Batch& batch, std::size_t b, LaneWork<lanes>& work, int l) {
   const int m = batch.shape.rows, n = batch.shape.cols, k = batch.columns(), length = batch.length();
   const double* const j = batch.jacobian_of(b);
+  const double* const x = batch.twist_of(b);
+  for (int i = 0; batch.wide() && i < k; ++i) {
+    const double weight = batch.weight(i);
+    for (int at = 0; at < n; ++at) work.w[i][at][l] = weight * j[i * n + at];
+    if (!batch.needs_u) work.w[i][n][l] = weight * x[i];
+  }
+  for (int i = 0; !batch.wide() && i < k; ++i) {
+    for (int at = 0; at < m; ++at) work.w[i][at][l] = batch.weight(at) * j[at * n + i];
+  }
+  if (batch.wide() && !batch.needs_u) return;
   for (int i = 0; i < k; ++i) {
-    for (int at = 0; at < length; ++at) {
-      work.w[i][at][l] = batch.wide() ? batch.weight(i) * j[i * n + at] : batch.weight(at) * j[at * n + i];
-    }
-    if (batch.wide() && !batch.needs_u) {
-      work.w[i][length][l] = batch.weight(i) * batch.twist_of(b)[i];
-    } else {
-      for (int at = 0; at < (batch.wide() ? m : n); ++at) work.w[i][length + at][l] = at == i ? 1.0 : 0.0;
-    }
+    for (int at = 0; at < k; ++at) work.w[i][length + at][l] = at == i ? 1.0 : 0.0;
   }
 }
 
 template <int lanes>
 SIGMAIK_INLINE void orthogonalise(const Batch& batch, LaneWork<lanes>& one, LaneWork<lanes>& two) {
   const int length = batch.length(), entries = length + batch.carried();
-  const auto known = [&](auto size, auto all) __attribute__((always_inline)) {
-    detail::lane_orthogonalise<6, lanes>(one, two, size, all);
-  };
+  const auto known = [&](auto size, auto all)
+                         __attribute__((always_inline)) { detail::lane_orthogonalise<6, lanes>(one, two, size, all); };
   using detail::lane_orthogonalise;
   switch (batch.columns()) {
     case 1: return lane_orthogonalise<1, lanes>(one, two, length, entries);
@@ -221,12 +226,20 @@ SIGMAIK_INLINE void solve_block(const Batch& batch, std::size_t begin, std::size
   const int n = batch.shape.cols, k = batch.columns(), offset = batch.wide() ? 0 : batch.length();
   for (int half = 0; half < 2; ++half) {
     LaneWork<lanes>& work = works[half];
+    detail::Vector<lanes> sigma[kMaxTask], inverse[kMaxTask];
+    for (int i = 0; i < k; ++i) {
+      sigma[i] = detail::square_root(work.square[i]);
+      inverse[i] = 1.0 / sigma[i];
+    }
     std::array<double, 6> factors[lanes] = {};
     bool done[lanes] = {}, exact[lanes] = {};
     for (int l = 0; l < lanes && static_cast<std::size_t>(half * lanes + l) < count; ++l) {
       if (work.regular[l] == 0) continue;
-      Lane lane{reinterpret_cast<const double*>(&work.w[0][0]) + l, lanes, {}};
-      for (int i = 0; i < k; ++i) lane.square[i] = work.square[i][l];
+      Lane lane{reinterpret_cast<const double*>(&work.w[0][0]) + l, lanes, {}, {}};
+      for (int i = 0; i < k; ++i) {
+        lane.sigma[i] = sigma[i][l];
+        lane.inverse[i] = inverse[i][l];
+      }
       done[l] = answer(batch, begin + static_cast<std::size_t>(half * lanes + l), lane, spectrum, factors[l], exact[l]);
     }
     detail::Vector<lanes> sum[kMaxJoints];

@@ -12,8 +12,8 @@
 namespace sigmaik::detail {
 
 // A column whose square is below this part of the largest square belongs to a matrix that is singular, or nearly: its
-// directions are mostly rounding.
-constexpr double kLaneSingular = 1e-12;
+// direction is known to some 1e-11 at best.
+constexpr double kLaneSingular = 1e-10;
 constexpr int kLaneSweeps = 12;  // five or six are usual
 constexpr int kLaneEntries = 16 + 6;
 

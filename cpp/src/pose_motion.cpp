@@ -138,8 +138,8 @@ PoseMotion extrapolated(const PoseMotion& from, double seconds) noexcept {
   const Curve chart{seconds * (omega + 0.5 * seconds * alpha), omega + seconds * alpha, alpha};
   const Curve turn = exp_curve(chart);
   PoseMotion out;
-  out.pose.translation() =
-      from.pose.translation() + seconds * (from.twist.head<3>() + 0.5 * seconds * from.acceleration.head<3>());
+  out.pose.translation() = from.pose.translation() +
+                           seconds * (from.twist.head<3>() + 0.5 * seconds * from.acceleration.head<3>());
   out.pose.linear() = rotation_exp(chart.x) * from.pose.linear();
   out.twist << from.twist.head<3>() + seconds * from.acceleration.head<3>(), turn.rate;
   out.acceleration << from.acceleration.head<3>(), turn.acceleration;
@@ -156,8 +156,8 @@ void follow(const PoseMotion& then, const PoseMotion& now, double dt, const Foll
   const Vector3d carried = turn * then.twist.tail<3>(), spin = target.twist.tail<3>() - carried;
   const Curve place{way.head<3>(), target.twist.head<3>() - then.twist.head<3>(),
                     target.acceleration.head<3>() - then.acceleration.head<3>()};
-  const Curve chart = log_curve(way.tail<3>(), spin,
-                                target.acceleration.tail<3>() - spin.cross(carried) - turn * then.acceleration.tail<3>());
+  const Curve chart = log_curve(
+      way.tail<3>(), spin, target.acceleration.tail<3>() - spin.cross(carried) - turn * then.acceleration.tail<3>());
 
   const Curve place_left = decayed(place, dt, smoothing), chart_left = decayed(chart, dt, smoothing);
   const Matrix3d turned = rotation_exp(chart_left.x);

@@ -123,8 +123,7 @@ bool ServoBatch::update_twist(std::span<const double> twists, Frame frame) noexc
   if (twists.size() != 6 * size()) return false;
   parts_->run([&](Servo& servo, std::size_t b) noexcept {
     const Twist twist = Eigen::Map<const Eigen::Matrix<double, 6, 1>>(twists.data() + 6 * b);
-    return frame == Frame::Base ? servo.update_twist(twist)
-                                : servo.update_twist(twist, frame, Eigen::Vector3d::Zero());
+    return frame == Frame::Base ? servo.update_twist(twist) : servo.update_twist(twist, frame, Eigen::Vector3d::Zero());
   });
   return true;
 }

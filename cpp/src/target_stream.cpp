@@ -13,7 +13,7 @@ namespace {
 using detail::require;
 
 constexpr double kFarthest = 1e9;  // [m]: differences of positions and their squares stay finite
-constexpr double kSigmas = 4.0;  // standard deviations of the noise of two samples that do not count as motion
+constexpr double kSigmas = 4.0;    // standard deviations of the noise of two samples that do not count as motion
 
 void check(const char* what, double value, bool zero_allowed) {
   require(std::isfinite(value) && (value > 0.0 || (zero_allowed && value == 0.0)), what, " = ", value,

@@ -39,8 +39,9 @@ class WorkerPool {
   template <typename Work>
   void run(std::size_t count, const Work& work) noexcept {
     if (threads_.empty()) return work(std::size_t{0}, count);
-    task_ = {[](const void* what, std::size_t begin, std::size_t end) { (*static_cast<const Work*>(what))(begin, end); },
-             &work, count, size()};
+    task_ = {
+        [](const void* what, std::size_t begin, std::size_t end) { (*static_cast<const Work*>(what))(begin, end); },
+        &work, count, size()};
     left_.store(threads_.size(), std::memory_order_relaxed);
     call();
     part(0);

@@ -54,13 +54,15 @@ std::vector<Sent> schedule(Random& random, const ActionChunksOptions& options, d
   for (double stamp = 0.0; stamp < seconds; stamp += random.uniform(0.03, 0.6)) {
     if (random.chance(0.15)) continue;
     if (random.chance(0.05)) centre = random.pose(0.5);
-    Sent chunk{stamp + random.uniform(0.02, 0.4), stamp + (random.chance(0.05) ? random.uniform(-1.0, 1.0) : 0.0), {}, {}};
+    Sent chunk{
+        stamp + random.uniform(0.02, 0.4), stamp + (random.chance(0.05) ? random.uniform(-1.0, 1.0) : 0.0), {}, {}};
     const int count = random.chance(0.1) ? 1 : random.integer(2, 20);
     for (int i = 0; i < count; ++i) {
       const double t = pace * (stamp + options.first + i * options.dt_action);
       Pose pose = centre;
       pose.translation() += 0.2 * Vector3d(std::sin(t), std::cos(t), std::sin(2.0 * t)) + noise * random.vector(3);
-      pose.linear() = rotation_exp(Vector3d(0.5 * std::sin(t), 0.3 * std::cos(t), noise * random.normal())) * pose.linear();
+      pose.linear() = rotation_exp(Vector3d(0.5 * std::sin(t), 0.3 * std::cos(t), noise * random.normal())) *
+                      pose.linear();
       chunk.poses.push_back(pose);
       Twist twist;
       twist << random.vector(3) * 0.2, random.vector(3) * 0.5;
@@ -99,7 +101,8 @@ TEST_CASE("chunks that agree are followed exactly, however late they come and ho
     for (double time = delay; time < 3.0; time += 1e-3) {
       if (time >= next + delay) {
         Poses poses;
-        for (int i = 0; i < count; ++i) poses.push_back(screw(start, twist, next + options.first + i * options.dt_action));
+        for (int i = 0; i < count; ++i)
+          poses.push_back(screw(start, twist, next + options.first + i * options.dt_action));
         REQUIRE(chunks.push(next, poses) == ChunkStatus::Accepted);
         next += period;
       }
@@ -132,8 +135,8 @@ TEST_CASE("chunks of twists that agree are followed exactly, from where the targ
         next += 0.2;
       }
       const ActionTarget target = chunks.at(time);
-      if (cycle == 2500) settled = target.pose;  // the first chunk's twist was blended in from rest
-      if (cycle >= 2500) worst = std::max(worst, pose_error(target.pose, screw(settled, twist, time - 2.5)).norm());
+      if (cycle == 3000) settled = target.pose;  // the first chunk's twist was blended in from rest
+      if (cycle >= 3000) worst = std::max(worst, pose_error(target.pose, screw(settled, twist, time - 3.0)).norm());
     }
     CHECK(worst < 1e-8);
   }
@@ -163,7 +166,7 @@ TEST_CASE("a late chunk neither goes back nor repeats a way: no sawtooth") {
 TEST_CASE("pose, twist and acceleration are continuous, and speed, acceleration and jerk bounded, for any schedule") {
   Random random(3);
   const double dt = 2e-3;
-  for (int trial = 0; trial < 2000; ++trial) {
+  for (int trial = 0; trial < 1000; ++trial) {
     CAPTURE(trial);
     ActionChunksOptions options;
     options.dt_action = random.uniform(0.02, 0.2);
@@ -206,7 +209,7 @@ TEST_CASE("where chunks stop, the target comes to rest at the last action, on th
   Random random(4);
   for (int trial = 0; trial < 100; ++trial) {
     ActionChunksOptions options;
-    options.stop_time = random.uniform(0.05, 0.5);
+    options.stop_time = random.uniform(2.0, 6.0) * options.smoothing;
     ActionChunks chunks(options);
     const Pose start = random.pose();
     const Twist twist = slow_twist(random);

@@ -26,7 +26,8 @@ struct ActionChunksOptions {
   double max_speed = 1.5;          ///< [m/s] > 0: the target is never faster
   double max_angular_speed = 4.0;  ///< [rad/s] > 0
   /// [s] ≥ 0: so long takes the stop at the end of a chunk that no other chunk has replaced. It begins half as long
-  /// before the last action, which is where the target comes to rest. With 0 only the bounds above act.
+  /// before the last action, which is where the target comes to rest. From 1.8 `smoothing` on the target keeps to the
+  /// way there from any speed; a shorter stop goes beyond the last action, as the bounds above ask for, and comes back.
   double stop_time = 0.3;
   int max_actions = 128;  ///< 1 to 10 000: longer chunks are refused. The memory is allocated by the constructor.
 };
@@ -97,9 +98,9 @@ struct ActionTarget {
 /// action. The target stays on the policy's way, and comes to rest where the policy has been heading.
 ///
 /// *Output.* The law of TargetStream: the difference from the chunk's motion has a triple pole and starts, when another
-/// chunk becomes the newest, from pose, twist and acceleration of the last target. None of the three jumps, whatever the
-/// chunks say. Where chunks agree, the difference is zero and stays zero. Speed, acceleration (max_speed/smoothing) and
-/// jerk (4.2 max_speed/smoothing²) are bounded, linear and angular; see target_stream.hpp for the proof.
+/// chunk becomes the newest, from pose, twist and acceleration of the last target. None of the three jumps, whatever
+/// the chunks say. Where chunks agree, the difference is zero and stays zero. Speed, acceleration (max_speed/smoothing)
+/// and jerk (4.2 max_speed/smoothing²) are bounded, linear and angular; see target_stream.hpp for the proof.
 class ActionChunks {
  public:
   /// \throws Error where an option is out of its range
