@@ -1,7 +1,7 @@
 """Chunks of a policy through ActionChunks, beside what else is done with them: action_chunks.py [SEEDS].
 
-A policy of the usual kind (ACT, diffusion policy): it looks at the scene, thinks for 50 to 300 ms, and sends 16 poses at
-10 Hz, for the time of the look and after it; every chunk is wrong by a noise of its own, 2 mm and 5 mrad, and each
+A policy of the usual kind (ACT, diffusion policy): it looks at the scene, thinks for 50 to 300 ms, and sends 16 poses
+at 10 Hz, for the time of the look and after it; every chunk is wrong by a noise of its own, 2 mm and 5 mrad, and each
 action by another 0.5 mm; one chunk in ten does not come. The plan is a figure of eight with changing orientation. An
 xArm7 follows at 1 kHz by a Servo of default options, or, for PlaCo, by the one-step inverse kinematics that LeRobot's
 RobotKinematics makes of each action. Prints a Markdown table.
