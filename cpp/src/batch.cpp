@@ -40,6 +40,9 @@ using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::Ro
 constexpr double kTie = 1e-6;
 constexpr double kExact = 1e-9;  // part of the command that an exact answer may miss, as for a VelocitySolver
 
+template <int value>
+using Constant = std::integral_constant<int, value>;
+
 // The problems, and what the method needs of their decompositions.
 struct Batch {
   const Method& method;
@@ -101,9 +104,9 @@ void solve_alone(const Batch& batch, VelocitySolver& solver, std::size_t b) noex
 
 // One lane of a decomposition: the lengths of the orthogonal columns, one over each, and their entries.
 struct Lane {
-  const double* entries;  // entry j of column i is at (i kLaneEntries + j) stride
-  int stride;
-  double sigma[kMaxTask], inverse[kMaxTask];
+  const double* entries = nullptr;  // entry j of column i is at (i kLaneEntries + j) stride
+  int stride = 0;
+  double sigma[kMaxTask] = {}, inverse[kMaxTask] = {};
 
   double at(int i, int j) const noexcept { return entries[(i * detail::kLaneEntries + j) * stride]; }
 };
@@ -173,16 +176,17 @@ Status judge(const Batch& batch, std::size_t b, bool exact) noexcept {
   return exact && missed <= kExact * largest ? Status::Ok : Status::Damped;
 }
 
-// Lane l of `work` becomes problem b: the columns, weighted, and what rotates with them.
-template <int lanes>
-SIGMAIK_INLINE void load_lane(const Batch& batch, std::size_t b, LaneWork<lanes>& work, int l) {
-  const int m = batch.shape.rows, n = batch.shape.cols, k = batch.columns(), length = batch.length();
+// Lane l of `work` becomes problem b: the columns, weighted, and what rotates with them. `length` as that of the batch.
+template <int lanes, typename Size>
+SIGMAIK_INLINE void load_lane(const Batch& batch, std::size_t b, LaneWork<lanes>& work, int l, Size length) {
+  const int m = batch.shape.rows, n = batch.shape.cols, k = batch.columns();
   const double* const j = batch.jacobian_of(b);
   const double* const x = batch.twist_of(b);
   for (int i = 0; batch.wide() && i < k; ++i) {
     const double weight = batch.weight(i);
-    for (int at = 0; at < n; ++at) work.w[i][at][l] = weight * j[i * n + at];
-    if (!batch.needs_u) work.w[i][n][l] = weight * x[i];
+    const double* const row = j + i * length;
+    for (int at = 0; at < length; ++at) work.w[i][at][l] = weight * row[at];
+    if (!batch.needs_u) work.w[i][length][l] = weight * x[i];
   }
   for (int i = 0; !batch.wide() && i < k; ++i) {
     for (int at = 0; at < m; ++at) work.w[i][at][l] = batch.weight(at) * j[at * n + i];
@@ -193,74 +197,55 @@ SIGMAIK_INLINE void load_lane(const Batch& batch, std::size_t b, LaneWork<lanes>
   }
 }
 
-template <int lanes>
-SIGMAIK_INLINE void orthogonalise(const Batch& batch, LaneWork<lanes>& one, LaneWork<lanes>& two) {
-  const int length = batch.length(), entries = length + batch.carried();
-  const auto known = [&](auto size, auto all)
-                         __attribute__((always_inline)) { detail::lane_orthogonalise<6, lanes>(one, two, size, all); };
-  using detail::lane_orthogonalise;
-  switch (batch.columns()) {
-    case 1: return lane_orthogonalise<1, lanes>(one, two, length, entries);
-    case 2: return lane_orthogonalise<2, lanes>(one, two, length, entries);
-    case 3: return lane_orthogonalise<3, lanes>(one, two, length, entries);
-    case 4: return lane_orthogonalise<4, lanes>(one, two, length, entries);
-    case 5: return lane_orthogonalise<5, lanes>(one, two, length, entries);
-    default: break;
-  }
-  // The arms that there are: sizes that the compiler knows.
-  if (length == 6 && entries == 7) return known(std::integral_constant<int, 6>{}, std::integral_constant<int, 7>{});
-  if (length == 7 && entries == 8) return known(std::integral_constant<int, 7>{}, std::integral_constant<int, 8>{});
-  known(length, entries);
-}
-
-// Problems [begin, begin + count) of a block of two works; lanes beyond repeat the last problem.
-template <int lanes>
+// Problems [begin, begin + count) of a block; lanes beyond repeat the last problem.
+template <int k, int lanes, typename Size, typename Entries>
 SIGMAIK_INLINE void solve_block(const Batch& batch, std::size_t begin, std::size_t count, VelocitySolver& alone,
-                                Spectrum& spectrum) {
-  LaneWork<lanes> works[2];
-  for (int l = 0; l < 2 * lanes; ++l) {
-    load_lane<lanes>(batch, begin + std::min(static_cast<std::size_t>(l), count - 1), works[l / lanes], l % lanes);
+                                Spectrum& spectrum, Size length, Entries entries) {
+  LaneWork<lanes> work;
+  for (int l = 0; l < lanes; ++l) {
+    load_lane<lanes>(batch, begin + std::min(static_cast<std::size_t>(l), count - 1), work, l, length);
   }
-  orthogonalise<lanes>(batch, works[0], works[1]);
+  detail::lane_orthogonalise<k, lanes>(work, length, entries);
 
-  const int n = batch.shape.cols, k = batch.columns(), offset = batch.wide() ? 0 : batch.length();
-  for (int half = 0; half < 2; ++half) {
-    LaneWork<lanes>& work = works[half];
-    detail::Vector<lanes> sigma[kMaxTask], inverse[kMaxTask];
-    for (int i = 0; i < k; ++i) {
-      sigma[i] = detail::square_root(work.square[i]);
-      inverse[i] = 1.0 / sigma[i];
+  Lane lane[lanes];
+  std::array<double, 6> factors[lanes] = {};
+  bool done[lanes] = {}, exact[lanes] = {};
+  for (int i = 0; i < k; ++i) {
+    const detail::Vector<lanes> sigma = detail::square_root(work.square[i]), inverse = 1.0 / sigma;
+    for (int l = 0; l < lanes; ++l) {
+      lane[l].sigma[i] = sigma[l];
+      lane[l].inverse[i] = inverse[l];
     }
-    std::array<double, 6> factors[lanes] = {};
-    bool done[lanes] = {}, exact[lanes] = {};
-    for (int l = 0; l < lanes && static_cast<std::size_t>(half * lanes + l) < count; ++l) {
-      if (work.regular[l] == 0) continue;
-      Lane lane{reinterpret_cast<const double*>(&work.w[0][0]) + l, lanes, {}, {}};
-      for (int i = 0; i < k; ++i) {
-        lane.sigma[i] = sigma[i][l];
-        lane.inverse[i] = inverse[i][l];
-      }
-      done[l] = answer(batch, begin + static_cast<std::size_t>(half * lanes + l), lane, spectrum, factors[l], exact[l]);
+  }
+  for (int l = 0; l < lanes && static_cast<std::size_t>(l) < count; ++l) {
+    if (work.regular[l] == 0) continue;
+    lane[l].entries = reinterpret_cast<const double*>(&work.w[0][0]) + l;
+    lane[l].stride = lanes;
+    done[l] = answer(batch, begin + static_cast<std::size_t>(l), lane[l], spectrum, factors[l], exact[l]);
+  }
+
+  // q̇ = Σ factor_i × the columns' entries that are v_i, but for a factor.
+  const int n = batch.shape.cols, offset = batch.wide() ? 0 : length;
+  detail::Vector<lanes> factor[kMaxTask] = {}, zero = detail::splat<lanes>(0.0);
+  for (int i = 0; i < k; ++i) {
+    detail::Vector<lanes> all = zero;
+    for (int l = 0; l < lanes; ++l) all[l] = factors[l][static_cast<std::size_t>(i)];
+    factor[i] = all;
+  }
+  for (int j = 0; j < n; ++j) {
+    detail::Vector<lanes> sum = factor[0] * work.w[0][offset + j];
+    for (int i = 1; i < k; ++i) sum += factor[i] * work.w[i][offset + j];
+    zero += 0.0 * sum;
+    for (int l = 0; l < lanes && static_cast<std::size_t>(l) < count; ++l) {
+      batch.qdot_of(begin + static_cast<std::size_t>(l))[j] = sum[l];
     }
-    detail::Vector<lanes> sum[kMaxJoints];
-    for (int j = 0; j < n; ++j) sum[j] = detail::splat<lanes>(0.0);
-    for (int i = 0; i < k; ++i) {
-      detail::Vector<lanes> factor;
-      for (int l = 0; l < lanes; ++l) factor[l] = factors[l][static_cast<std::size_t>(i)];
-      for (int j = 0; j < n; ++j) sum[j] += factor * work.w[i][offset + j];
-    }
-    for (int l = 0; l < lanes && static_cast<std::size_t>(half * lanes + l) < count; ++l) {
-      const std::size_t b = begin + static_cast<std::size_t>(half * lanes + l);
-      double zero = 0.0;
-      for (int j = 0; j < n; ++j) {
-        batch.qdot_of(b)[j] = sum[j][l];
-        zero += 0.0 * sum[j][l];
-      }
-      if (!done[l] || zero != 0.0) {
-        solve_alone(batch, alone, b);
-      } else if (batch.status != nullptr) {
-        batch.status[b] = static_cast<std::int8_t>(judge(batch, b, exact[l]));
-      }
+  }
+  for (int l = 0; l < lanes && static_cast<std::size_t>(l) < count; ++l) {
+    const std::size_t b = begin + static_cast<std::size_t>(l);
+    if (!done[l] || zero[l] != 0.0) {
+      solve_alone(batch, alone, b);
+    } else if (batch.status != nullptr) {
+      batch.status[b] = static_cast<std::int8_t>(judge(batch, b, exact[l]));
     }
   }
 }
@@ -270,9 +255,26 @@ template <int lanes>
 SIGMAIK_INLINE void solve_range(const Batch& batch, std::size_t begin, std::size_t end, VelocitySolver& alone) {
   Spectrum spectrum;
   SpectrumParts::begin(spectrum, batch.shape.rows, batch.shape.cols);
-  for (; begin < end; begin += 2 * lanes) {
-    solve_block<lanes>(batch, begin, std::min<std::size_t>(end - begin, 2 * lanes), alone, spectrum);
+  const auto run = [&](auto columns, auto length, auto entries) __attribute__((always_inline)) {
+    constexpr int k = decltype(columns)::value;
+    for (; begin < end; begin += lanes) {
+      const std::size_t count = std::min<std::size_t>(end - begin, lanes);
+      solve_block<k, lanes>(batch, begin, count, alone, spectrum, length, entries);
+    }
+  };
+  const int length = batch.length(), entries = length + batch.carried();
+  switch (batch.columns()) {
+    case 1: return run(Constant<1>{}, length, entries);
+    case 2: return run(Constant<2>{}, length, entries);
+    case 3: return run(Constant<3>{}, length, entries);
+    case 4: return run(Constant<4>{}, length, entries);
+    case 5: return run(Constant<5>{}, length, entries);
+    default: break;
   }
+  // The arms that there are: sizes that the compiler knows.
+  if (length == 6 && entries == 7) return run(Constant<6>{}, Constant<6>{}, Constant<7>{});
+  if (length == 7 && entries == 8) return run(Constant<6>{}, Constant<7>{}, Constant<8>{});
+  run(Constant<6>{}, length, entries);
 }
 
 void solve_baseline(const Batch& batch, std::size_t begin, std::size_t end, VelocitySolver& alone) {

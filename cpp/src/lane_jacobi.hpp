@@ -136,37 +136,27 @@ SIGMAIK_INLINE void lane_end(LaneWork<lanes>& work, Size length, const LaneState
   for (int i = 0; i < k; ++i) work.regular &= work.square[i] > kLaneSingular * peak;
 }
 
-// Rotates pairs of columns, in the order of Rounds<k> (jacobi.hpp), until the columns of all lanes are orthogonal. Two
-// works at once: while the roots of the one's angles are under way, the other's columns are rotated.
+// Rotates pairs of columns, in the order of Rounds<k> (jacobi.hpp), until the columns of all lanes are orthogonal.
 template <int k, int lanes, typename Size, typename Entries>
-SIGMAIK_INLINE void lane_orthogonalise(LaneWork<lanes>& one, LaneWork<lanes>& two, Size length, Entries entries) {
+SIGMAIK_INLINE void lane_orthogonalise(LaneWork<lanes>& work, Size length, Entries entries) {
   using Order = Rounds<k>;
-  LaneState<lanes> a, b;
+  LaneState<lanes> state;
   Vector<lanes> peak;
-  a.active = a.sound = lane_measure<k, lanes>(one, length, peak);
-  a.noise = 0.1 * kLaneSingular * peak;
-  b.active = b.sound = lane_measure<k, lanes>(two, length, peak);
-  b.noise = 0.1 * kLaneSingular * peak;
-  for (int sweep = 0; sweep < kLaneSweeps && any<lanes>(a.active | b.active); ++sweep) {
-    if (sweep > 0) {  // what the rotations leave of small squares is mostly rounding
-      lane_measure<k, lanes>(one, length, peak);
-      lane_measure<k, lanes>(two, length, peak);
-    }
-    a.left = b.left = a.active ^ a.active;
-    LaneTurn<lanes> of_one[Order::width], of_two[Order::width];
+  state.active = state.sound = lane_measure<k, lanes>(work, length, peak);
+  state.noise = 0.1 * kLaneSingular * peak;
+  for (int sweep = 0; sweep < kLaneSweeps && any<lanes>(state.active); ++sweep) {
+    // What rotations leave of small squares is mostly rounding.
+    if (sweep > 0) lane_measure<k, lanes>(work, length, peak);
+    state.left = state.active ^ state.active;
 #pragma GCC unroll 5
     for (int round = 0; round < Order::count; ++round) {
-      lane_angles<k, lanes>(one, length, round, a, of_one);
-      if (round > 0) lane_rotations<k, lanes>(two, entries, round - 1, of_two);
-      lane_angles<k, lanes>(two, length, round, b, of_two);
-      lane_rotations<k, lanes>(one, entries, round, of_one);
+      LaneTurn<lanes> turns[Order::width];
+      lane_angles<k, lanes>(work, length, round, state, turns);
+      lane_rotations<k, lanes>(work, entries, round, turns);
     }
-    if (Order::count > 0) lane_rotations<k, lanes>(two, entries, Order::count - 1, of_two);
-    a.active &= a.left;
-    b.active &= b.left;
+    state.active &= state.left;
   }
-  lane_end<k, lanes>(one, length, a);
-  lane_end<k, lanes>(two, length, b);
+  lane_end<k, lanes>(work, length, state);
 }
 
 }  // namespace sigmaik::detail
