@@ -147,7 +147,9 @@ void bind_batch(py::module_& m) {
       },
       py::arg("method"), py::arg("J"), py::arg("twist"), py::arg("length_scale") = 1.0, py::arg("threads") = 1,
       "Joint velocities (B, n) for B independent problems, J (B, m, n) and twist (B, m), without the GIL.\n\n"
-      "Each is solved as by a fresh VelocitySolver, so order and number of threads do not change the answers.\n"
+      "Each is solved as by a fresh VelocitySolver, to 1e-9, side by side in vector lanes. Order, B and number of "
+      "threads\n"
+      "do not change an answer.\n"
       "Raises Error where a shape is wrong or an entry is not finite.");
 }
 

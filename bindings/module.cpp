@@ -73,8 +73,10 @@ PYBIND11_MODULE(_core, m) {
   bind_methods(m);
   bind_solver(m);
   bind_servo(m);
+  bind_servo_batch(m);
   bind_servo_loop(m);
   bind_target_stream(m);
+  bind_action_chunks(m);
   bind_dynamics(m);
   bind_least_squares(m);
   bind_constrained_ik(m);

@@ -18,6 +18,9 @@ struct VectorOf<4> {
 };
 template <int lanes>
 using Vector = typename VectorOf<lanes>::type;
+// −1 or 0 in each lane: what a comparison of two vectors gives.
+template <int lanes>
+using Mask = decltype(Vector<lanes>{} < Vector<lanes>{});
 
 template <int lanes>
 SIGMAIK_INLINE Vector<lanes> splat(double x) {

@@ -13,10 +13,15 @@ Units are m, rad, s, N·m. Twists and Jacobians are [v; ω], in base axes, at th
 
 from . import _rules, indices, methods, planning, robots, sim, singularities
 from ._core import (
+    ActionChunks,
+    ActionStatus,
+    ActionTarget,
     AnalyticBranch,
     AnalyticIk,
     ArgumentError,
     Chain,
+    ChunkCounts,
+    ChunkStatus,
     ComputedTorque,
     ComputedTorqueStep,
     ConstrainedIk,
@@ -43,6 +48,7 @@ from ._core import (
     SampleStatus,
     Segment,
     Servo,
+    ServoBatch,
     ServoLoop,
     ServoStep,
     Solution,
@@ -62,10 +68,15 @@ from ._core import (
 from ._rules import *  # noqa: F403  # the rules' classes
 
 __all__ = [
+    "ActionChunks",
+    "ActionStatus",
+    "ActionTarget",
     "AnalyticBranch",
     "AnalyticIk",
     "ArgumentError",
     "Chain",
+    "ChunkCounts",
+    "ChunkStatus",
     "ComputedTorque",
     "ComputedTorqueStep",
     "ConstrainedIk",
@@ -92,6 +103,7 @@ __all__ = [
     "SampleStatus",
     "Segment",
     "Servo",
+    "ServoBatch",
     "ServoLoop",
     "ServoStep",
     "Solution",

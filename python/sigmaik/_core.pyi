@@ -10,7 +10,7 @@ import os
 import pathlib
 import sigmaik.planning.status
 import typing
-__all__: list[str] = ['AdaptiveDampedLeastSquares', 'AnalyticBranch', 'AnalyticIk', 'ArgumentError', 'ArmSpheres', 'CartError', 'CartMeasures', 'CartMotion', 'CartRegion', 'Chain', 'Clearance', 'ComputedTorque', 'ComputedTorqueStep', 'ConstrainedIk', 'ConstrainedIkStep', 'Crossing', 'DEFAULT_SCALE', 'DampedLeastSquares', 'DistanceField', 'Dynamics', 'Error', 'GuideState', 'Inertia', 'JParse', 'JacobianProjection', 'JacobianSafety', 'JacobianSafetyProjection', 'JointCost', 'JointLimits', 'LeastSquaresSolution', 'LoopCommand', 'LoopFault', 'LoopFaultKind', 'LoopState', 'LoopStatistics', 'LoopToken', 'Method', 'ModelWarning', 'PlaneCartMotion', 'Playback', 'PositionIk', 'PositionIkBranch', 'PositionIkResult', 'PositionIkStatus', 'PseudoInverse', 'SampleCounts', 'SampleStatus', 'Segment', 'SelectivelyDampedLeastSquares', 'Servo', 'ServoLoop', 'ServoStep', 'SingularSets', 'Solution', 'Spectrum', 'Status', 'StreamStatus', 'Target', 'TargetStream', 'TimeOptimal', 'TimeOptimalResult', 'Trajectory', 'VelocitySolver', 'admissible_guess', 'cart_descent', 'cart_motion', 'cart_motion_by_descent', 'clearance', 'collision_cost', 'draw_from_prior', 'evaluate_cart_motion', 'evaluate_cart_motion_plane', 'evaluate_index', 'forbidden_intervals', 'geometry_aware_cost', 'index_of_jacobian', 'joint_limit_cost', 'known_singular_sets', 'least_squares', 'load_singular_sets', 'log_manipulability_cost', 'manipulability_cost', 'min_distance', 'plan_gradient', 'plan_stochastic', 'plane_cart_motion', 'planner_options', 'play', 'pose_error', 'potential_cost', 'reference_scale', 'rotation_exp', 'rotation_log', 'rules', 'scaled_cost', 'self_collision_cost', 'self_collision_pairs', 'singular_sets_of', 'solve_batch', 'spline_velocities', 'sum_of_costs', 'taut_string']
+__all__: list[str] = ['ActionChunks', 'ActionStatus', 'ActionTarget', 'AdaptiveDampedLeastSquares', 'AnalyticBranch', 'AnalyticIk', 'ArgumentError', 'ArmSpheres', 'CartError', 'CartMeasures', 'CartMotion', 'CartRegion', 'Chain', 'ChunkCounts', 'ChunkStatus', 'Clearance', 'ComputedTorque', 'ComputedTorqueStep', 'ConstrainedIk', 'ConstrainedIkStep', 'Crossing', 'DEFAULT_SCALE', 'DampedLeastSquares', 'DistanceField', 'Dynamics', 'Error', 'GuideState', 'Inertia', 'JParse', 'JacobianProjection', 'JacobianSafety', 'JacobianSafetyProjection', 'JointCost', 'JointLimits', 'LeastSquaresSolution', 'LoopCommand', 'LoopFault', 'LoopFaultKind', 'LoopState', 'LoopStatistics', 'LoopToken', 'Method', 'ModelWarning', 'PlaneCartMotion', 'Playback', 'PositionIk', 'PositionIkBranch', 'PositionIkResult', 'PositionIkStatus', 'PseudoInverse', 'SampleCounts', 'SampleStatus', 'Segment', 'SelectivelyDampedLeastSquares', 'Servo', 'ServoBatch', 'ServoLoop', 'ServoStep', 'SingularSets', 'Solution', 'Spectrum', 'Status', 'StreamStatus', 'Target', 'TargetStream', 'TimeOptimal', 'TimeOptimalResult', 'Trajectory', 'VelocitySolver', 'admissible_guess', 'cart_descent', 'cart_motion', 'cart_motion_by_descent', 'clearance', 'collision_cost', 'draw_from_prior', 'evaluate_cart_motion', 'evaluate_cart_motion_plane', 'evaluate_index', 'forbidden_intervals', 'geometry_aware_cost', 'index_of_jacobian', 'joint_limit_cost', 'known_singular_sets', 'least_squares', 'load_singular_sets', 'log_manipulability_cost', 'manipulability_cost', 'min_distance', 'plan_gradient', 'plan_stochastic', 'plane_cart_motion', 'planner_options', 'play', 'pose_error', 'potential_cost', 'reference_scale', 'rotation_exp', 'rotation_log', 'rules', 'scaled_cost', 'self_collision_cost', 'self_collision_pairs', 'singular_sets_of', 'solve_batch', 'spline_velocities', 'sum_of_costs', 'taut_string']
 DEFAULT_SCALE: float = 6.0
 __version__: str
 
@@ -644,7 +644,8 @@ def solve_batch(method: Method | str, J: numpy.typing.ArrayLike, twist: numpy.ty
     """
     Joint velocities (B, n) for B independent problems, J (B, m, n) and twist (B, m), without the GIL.
 
-    Each is solved as by a fresh VelocitySolver, so order and number of threads do not change the answers.
+    Each is solved as by a fresh VelocitySolver, to 1e-9, side by side in vector lanes. Order, B and number of threads
+    do not change an answer.
     Raises Error where a shape is wrong or an entry is not finite.
     """
 
@@ -889,6 +890,157 @@ class Servo:
     def settling_time(self) -> float:
         """
         [s], after which a motion towards a target that rests is called not settling.
+        """
+
+# ---- Servo batch ------------------------------------------------------------------------------------------------------
+class ServoBatch:
+    """
+    Many servos of one arm, rule and options, a cycle of all of them in one call, without the GIL.
+
+        batch = sk.ServoBatch(arm, None, 1e-2, 1024, threads=2)
+        batch.reset(home)                       # (n,) for all; batch.reset(q, mask) starts some of them again
+        batch.update(poses)                     # (B, 4, 4)
+        batch.q, batch.qdot, batch.status       # (B, n), (B, n), (B,)
+
+    Each servo does, to the last bit, what a Servo alone would do, and holds all limits. q, qdot, status, pose_error,
+    achieved_twist and pose are views on arrays that the batch owns: each cycle overwrites them, `.copy()` keeps them, and
+    what is written into them moves no servo. numpy.from_dlpack, torch.from_dlpack and others take them without a copy.
+    """
+    def __init__(self, chain: Chain, method: Method | str | None = None, dt: typing.SupportsFloat | typing.SupportsIndex = 0.001, size: typing.SupportsInt | typing.SupportsIndex = 1, threads: typing.SupportsInt | typing.SupportsIndex = 1, *, gain_linear: typing.SupportsFloat | typing.SupportsIndex = 10.0, gain_angular: typing.SupportsFloat | typing.SupportsIndex = 10.0, max_linear_error: typing.SupportsFloat | typing.SupportsIndex | None = None, max_angular_error: typing.SupportsFloat | typing.SupportsIndex = 1.0, soft_start: typing.SupportsFloat | typing.SupportsIndex = 0.1, posture: numpy.typing.ArrayLike | None = None, posture_gain: typing.SupportsFloat | typing.SupportsIndex = 0.0, posture_max_speed: typing.SupportsFloat | typing.SupportsIndex = ..., avoid: typing.Literal['manipulability', 'potential'] | None = None, avoid_gain: typing.SupportsFloat | typing.SupportsIndex = 1.0, avoid_max_speed: typing.SupportsFloat | typing.SupportsIndex = 0.5, eta1: typing.SupportsFloat | typing.SupportsIndex = 0.0, eta2: typing.SupportsFloat | typing.SupportsIndex = 10.0, position_limits: bool = True, velocity_limits: bool = True, acceleration_limits: bool = True, jerk_limits: bool = True, assumed_acceleration: typing.SupportsFloat | typing.SupportsIndex = 10.0, recovery_speed: typing.SupportsFloat | typing.SupportsIndex = 0.1, on_limit: typing.Literal['redistribute', 'scale'] = 'redistribute', exact: numpy.typing.ArrayLike | None = (0, 0, 0, 0, 0, 0), length_scale: typing.SupportsFloat | typing.SupportsIndex | None = None, guided: bool = False, mask: numpy.typing.ArrayLike | None = (1, 1, 1, 1, 1, 1), frame: typing.Literal['base', 'tool'] = 'base') -> None:
+        """
+        Warns (ModelWarning) of velocity and acceleration limits that joints lack.
+
+        method: None: JParse(), the best that there is.
+        dt: [s] > 0, from one update to the next.
+        size: B ≥ 1, number of servos.
+        threads: ≥ 1, the most that work at once; never more than the machine has cores. The threads live as
+            long as the batch, and the answers do not depend on their number.
+        gain_linear: [1/s] ≥ 0, from position error to velocity. (JParse's gain_linear is another thing: the
+            paper's K.)
+        gain_angular: [1/s] ≥ 0, from orientation error to angular velocity.
+        max_linear_error: [m] > 0: longer position errors are shortened to it. None: half of length_scale.
+        max_angular_error: [rad] > 0: longer orientation errors are shortened to it.
+        soft_start: [s] ≥ 0 over which a pose target's command is faded in after reset(); twists only where
+            reset() was told that the arm moves.
+        posture: (n,) nominal positions [rad or m]; None: those given to reset().
+        posture_gain: [1/s] ≥ 0, from the way to the posture to joint velocity.
+        posture_max_speed: [rad/s or m/s] > 0, cap on each joint's.
+        avoid: what keeps a redundant arm away from singularities: the gradient of the manipulability, or
+            minus that of the potentials Σ exp(eta1 − eta2 ψ_i) around the known singular sets, is added to
+            the posture's velocity.
+        avoid_gain: ≥ 0, by which that gradient is multiplied.
+        avoid_max_speed: [rad/s or m/s] > 0, of the fastest joint: longer velocities are shortened to it.
+        eta1: of the potentials, at most 100.
+        eta2: of the potentials, > 0.
+        position_limits: whether the chain's position limits are held, now and so that they can be held for
+            ever.
+        velocity_limits: the same for its velocity limits.
+        acceleration_limits: the same for its acceleration limits.
+        jerk_limits: the same for its jerk limits.
+        assumed_acceleration: [rad/s² or m/s²] > 0, the acceleration limit of joints whose model has none;
+            inf: they have none.
+        recovery_speed: in (0, 1], of the velocity limit: the least speed at which a joint that starts
+            outside its position limits comes back.
+        on_limit: what gives way at a position limit. 'redistribute': other joints take over, for the
+            nearest twist that limits allow; 'scale': the direction is kept, speed is given up. At a
+            velocity limit the direction is kept; 'redistribute' first uses the motion that does not move
+            the tool.
+        exact: (6,) truth values: the rows (vx, vy, vz, ωx, ωy, ωz) that come before the others in every
+            cycle.
+        length_scale: [m] > 0: 1 rad/s weighs as much as length_scale m/s, as for VelocitySolver. None:
+            chain.characteristic_length.
+        guided: whether the servo takes another way to a pose target that rests where its own way does not
+            arrive: through another configuration of the arm, if need be away from the tool's straight line.
+            `step.guide` says so. Arrives at each target that PositionIk finds.
+        mask: (6,) truth values: the rows (vx, vy, vz, ωx, ωy, ωz) that matter; None: all.
+        frame: the axes of these rows, the base's or the tool's.
+        """
+    def __len__(self) -> int:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def reset(self, q: numpy.typing.ArrayLike, mask: numpy.typing.ArrayLike | None = None, qdot: numpy.typing.ArrayLike | None = None) -> None:
+        """
+        Starts servos, or starts them again, at q: (n,) for all, or (B, n) with a row for each.
+
+        mask: (B,) truth values, the servos to start; None: all. The other rows of q are not read.
+        qdot: (n,) or (B, n) how the arms move now; None: they rest.
+        Where an entry that is read is not finite, Error is raised and nothing has changed.
+        """
+    def servo(self, index: typing.SupportsInt | typing.SupportsIndex) -> Servo:
+        """
+        A copy of one servo as it is now, with all of its history.
+        """
+    def update(self, poses: numpy.typing.ArrayLike, feedforward: numpy.typing.ArrayLike | None = None) -> ServoBatch:
+        """
+        One cycle of every servo towards poses (B, 4, 4) of the tip in the base, without the GIL. Returns the batch.
+
+        feedforward: (B, 6) twists [v; ω] of targets that move, base axes, at the target's origin.
+        A row that is not a pose stops its own servo, whose status is BAD_INPUT, and no other. Wrong shapes raise Error.
+        Arrays of float64 in C order are read where they are; others are copied first.
+        """
+    def update_twist(self, twists: numpy.typing.ArrayLike, frame: str = 'base') -> ServoBatch:
+        """
+        One cycle of every servo along twists (B, 6) [v; ω] of the tips' origins, without the GIL. Returns the batch.
+
+        frame: the axes of the twists, 'base' or 'tool'.
+        A row that is not finite stops its own servo, whose status is BAD_INPUT, and no other.
+        """
+    @property
+    def achieved_twist(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (B, 6) J q̇ [m/s, rad/s].
+        """
+    @property
+    def chain(self) -> Chain:
+        ...
+    @property
+    def dt(self) -> float:
+        """
+        [s]
+        """
+    @property
+    def method(self) -> Method:
+        ...
+    @property
+    def options(self) -> dict[str, typing.Any]:
+        """
+        The options by keyword: with ** of them the constructor makes the same again.
+        """
+    @property
+    def pose(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (B, 4, 4) the tips in the base, at q.
+        """
+    @property
+    def pose_error(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (B, 6) [m, rad] target minus tip before the cycle; zero for twists.
+        """
+    @property
+    def q(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (B, n) position commands [rad or m]; NaN before the first reset.
+        """
+    @property
+    def qdot(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (B, n) velocity commands over the last dt [rad/s or m/s].
+        """
+    @property
+    def size(self) -> int:
+        """
+        B.
+        """
+    @property
+    def status(self) -> numpy.typing.NDArray[numpy.int8]:
+        """
+        (B,) int8, a Status for each servo.
+        """
+    @property
+    def threads(self) -> int:
+        """
+        Threads that work at once.
         """
 
 # ---- Servo loop -------------------------------------------------------------------------------------------------------
@@ -1264,6 +1416,157 @@ class TargetStream:
     def counts(self) -> SampleCounts:
         """
         How many samples had which fate.
+        """
+    @property
+    def options(self) -> dict[str, typing.Any]:
+        """
+        The options by keyword: with ** of them the constructor makes the same again.
+        """
+
+# ---- Action chunks ----------------------------------------------------------------------------------------------------
+class ActionStatus(enum.IntEnum):
+    """
+    What the target of ActionChunks does, ordered from the best to the worst.
+    """
+    BLENDING = ...
+    LATE = ...
+    STARVED = ...
+    TRACKING = ...
+    WAITING = ...
+class ChunkStatus(enum.IntEnum):
+    """
+    What became of a chunk of actions.
+    """
+    ACCEPTED = ...
+    EXPIRED = ...
+    INVALID = ...
+    OUT_OF_ORDER = ...
+class ChunkCounts:
+    """
+    How many chunks and actions had which fate.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def accepted(self) -> int:
+        ...
+    @property
+    def expired(self) -> int:
+        ...
+    @property
+    def fast(self) -> int:
+        """
+        Actions that need more than max_speed or max_angular_speed: they are followed late.
+        """
+    @property
+    def invalid(self) -> int:
+        ...
+    @property
+    def missed(self) -> int:
+        """
+        Actions of accepted chunks whose time was over when the chunk came.
+        """
+    @property
+    def out_of_order(self) -> int:
+        ...
+    @property
+    def rough(self) -> int:
+        """
+        Actions whose rotation was off by more than rounding.
+        """
+class ActionTarget:
+    """
+    Where to be now, and how to move: servo.update(target.pose, target.twist); or pose, twist, status = target.
+    """
+    def __iter__(self) -> collections.abc.Iterator[typing.Any]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    @property
+    def age(self) -> float:
+        """
+        [s] since the stamp of the chunk; 0 before the first.
+        """
+    @property
+    def behind(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (6,) [m, rad] what is not done: from the target to where the newest chunk is at this time, base axes.
+        """
+    @property
+    def left(self) -> float:
+        """
+        [s] until the last action of the chunk; negative after it.
+        """
+    @property
+    def pose(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (4, 4) in base.
+        """
+    @property
+    def status(self) -> ActionStatus:
+        """
+        See ActionStatus.
+        """
+    @property
+    def twist(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (6,) derivative of the pose: [v; ω], base axes, at its origin.
+        """
+class ActionChunks:
+    """
+    The way from a policy to a servo: chunks of actions in, one smooth target a cycle out.
+
+        chunks = sk.ActionChunks(0.1)                # actions at 10 Hz
+        chunks.reset(servo.pose)
+        chunks.push(stamp, poses)                    # (k, 4, 4); stamp = when the observation was made
+        pose, twist, status = chunks.at(now)         # each cycle, on the same clock
+        servo.update(pose, twist)
+
+    Chunks may come late, overlap, or not at all. Action i is for the time stamp + first + i dt_action: what is over
+    is not done again. Pose, twist and acceleration of the target are continuous, speed, acceleration and jerk are
+    bounded, and where no chunk comes the target comes to rest at the last action.
+    """
+    def __init__(self, dt_action: typing.SupportsFloat | typing.SupportsIndex = 0.1, *, first: typing.SupportsFloat | typing.SupportsIndex = 0.0, smoothing: typing.SupportsFloat | typing.SupportsIndex = 0.1, max_speed: typing.SupportsFloat | typing.SupportsIndex = 1.5, max_angular_speed: typing.SupportsFloat | typing.SupportsIndex = 4.0, stop_time: typing.SupportsFloat | typing.SupportsIndex = 0.3, max_actions: typing.SupportsInt | typing.SupportsIndex = 128) -> None:
+        """
+        dt_action: [s] > 0, from one action of a chunk to the next.
+        first: [s] from the stamp of a chunk to the time of its first action: 0 where the first action is
+            for the time of the observation, dt_action where it is for the step after it.
+        smoothing: [s] ≥ 0: the difference that a new chunk makes decays to a tenth in 3.9 smoothing; the
+            jerk is at most 4.2 max_speed/smoothing².
+        max_speed: [m/s] > 0: the target is never faster.
+        max_angular_speed: [rad/s] > 0, likewise.
+        stop_time: [s] ≥ 0: so long takes the stop at the last action of a chunk that no other has replaced;
+            it begins half as long before that action.
+        max_actions: 1 to 10000: longer chunks are refused.
+        """
+    def __repr__(self) -> str:
+        ...
+    def at(self, time: typing.SupportsFloat | typing.SupportsIndex) -> ActionTarget:
+        """
+        The target at a time [s] not before that of the last call; else the last one again.
+        """
+    def push(self, stamp: typing.SupportsFloat | typing.SupportsIndex, poses: numpy.typing.ArrayLike) -> ChunkStatus:
+        """
+        A chunk of poses (k, 4, 4) of the tip in base. stamp: [s] when its observation was made.
+
+        Raises Error where a pose is none; what else is refused the answer says.
+        """
+    def push_twists(self, stamp: typing.SupportsFloat | typing.SupportsIndex, twists: numpy.typing.ArrayLike) -> ChunkStatus:
+        """
+        A chunk of twists (k, 6) [v; ω], base axes, at the tip's origin; it starts where the target is.
+
+        Twist i is the mean from stamp + first + i dt_action to the next. It needs a start: reset(start), or a chunk of
+        poses before it.
+        """
+    def reset(self, start: typing.Any = None) -> None:
+        """
+        Forgets everything. The next target is at `start` (4, 4), such as the tip's pose, and goes to the chunks from
+        there; with None it is where the first chunk is.
+        """
+    @property
+    def counts(self) -> ChunkCounts:
+        """
+        How many chunks and actions had which fate.
         """
     @property
     def options(self) -> dict[str, typing.Any]:

@@ -1,13 +1,15 @@
-// solve_batch() is a loop of fresh solvers, whatever the number of threads.
+// solve_batch() answers as fresh solvers do, and each answer is the same to the last bit wherever its problem stands.
 
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <limits>
 
 #include <sigmaik/batch.hpp>
 #include <sigmaik/error.hpp>
 #include <sigmaik/velocity_solver.hpp>
 
+#include "heap.hpp"
 #include "methods.hpp"
 #include "random.hpp"
 
@@ -46,37 +48,80 @@ Problem random_problem(Random& random, std::size_t count, int m, int n) {
 
 }  // namespace
 
-TEST_CASE("bit for bit a loop of fresh solvers, any size, any number of threads") {
+TEST_CASE("answers and statuses are those of fresh solvers to 1e-9, exactly singular Jacobians included") {
   Random random(1);
   for (int m = 1; m <= 6; ++m) {
     for (int n = 1; n <= 16; n += (n < 9 ? 1 : 7)) {
-      const Problem p = random_problem(random, 40, m, n);
+      const Problem p = random_problem(random, 60, m, n);
       for (const Method& method : all_methods()) {
         CAPTURE(m);
         CAPTURE(n);
         CAPTURE(name(method));
-        std::vector<double> expected;
-        std::vector<std::int8_t> expected_status;
+        std::vector<double> qdot(p.shape.count * static_cast<std::size_t>(n), -1.0), without_status = qdot;
+        std::vector<std::int8_t> status(p.shape.count, -1);
+        solve_batch(method, 0.7, p.shape, p.jacobian.data(), p.twist.data(), qdot.data(), status.data());
+        solve_batch(method, 0.7, p.shape, p.jacobian.data(), p.twist.data(), without_status.data());
         for (std::size_t b = 0; b < p.shape.count; ++b) {
           VelocitySolver solver(method, 0.7);
           const Solution s = solver.solve(p.j(b), p.x(b));
-          expected.insert(expected.end(), s.qdot.data(), s.qdot.data() + n);
-          expected_status.push_back(static_cast<std::int8_t>(s.status));
+          const auto row = [&](const std::vector<double>& rows) {
+            return Eigen::Map<const VectorXd>(rows.data() + b * static_cast<std::size_t>(n), n);
+          };
+          const double size = s.qdot.cwiseAbs().maxCoeff();
+          CHECK((row(qdot) - s.qdot).cwiseAbs().maxCoeff() <= 1e-9 * size);
+          CHECK((row(without_status) - s.qdot).cwiseAbs().maxCoeff() <= 1e-9 * size);
+          CHECK(status[b] == static_cast<std::int8_t>(s.status));
         }
-        for (const int threads : {1, 2, 3, 7, 40, 41, 100}) {
-          std::vector<double> qdot(p.shape.count * static_cast<std::size_t>(n), -1.0);
-          std::vector<std::int8_t> status(p.shape.count, -1);
-          solve_batch(method, 0.7, p.shape, p.jacobian.data(), p.twist.data(), qdot.data(), status.data(), threads);
-          CHECK(qdot == expected);
-          CHECK(status == expected_status);
-        }
-        std::vector<double> qdot(p.shape.count * static_cast<std::size_t>(n), -1.0);
-        solve_batch(method, 0.7, p.shape, p.jacobian.data(), p.twist.data(), qdot.data());
-        CHECK(qdot == expected);
       }
     }
   }
 }
+
+TEST_CASE("an answer depends, to the last bit, on its own problem alone: not on neighbours, place, size or threads") {
+  Random random(4);
+  for (const int m : {1, 3, 5, 6}) {
+    for (const int n : {2, 6, 7, 16}) {
+      const Problem p = random_problem(random, 41, m, n);
+      for (const Method& method : all_methods()) {
+        CAPTURE(m);
+        CAPTURE(n);
+        CAPTURE(name(method));
+        const auto width = static_cast<std::size_t>(n);
+        std::vector<double> all(p.shape.count * width), alone(p.shape.count * width), other(p.shape.count * width);
+        solve_batch(method, 0.7, p.shape, p.jacobian.data(), p.twist.data(), all.data());
+        for (std::size_t b = 0; b < p.shape.count; ++b) {
+          solve_batch(method, 0.7, {1, m, n}, p.jacobian.data() + b * static_cast<std::size_t>(m * n),
+                      p.twist.data() + b * static_cast<std::size_t>(m), alone.data() + b * width);
+        }
+        CHECK(alone == all);
+        for (const int threads : {2, 3, 7, 40, 41, 100}) {
+          solve_batch(method, 0.7, p.shape, p.jacobian.data(), p.twist.data(), other.data(), nullptr, threads);
+          CHECK(other == all);
+        }
+        // Shifted by three places: other lanes, other neighbours.
+        const std::size_t from = 3;
+        solve_batch(method, 0.7, {p.shape.count - from, m, n},
+                    p.jacobian.data() + from * static_cast<std::size_t>(m * n),
+                    p.twist.data() + from * static_cast<std::size_t>(m), other.data());
+        CHECK(std::equal(all.begin() + static_cast<std::ptrdiff_t>(from * width), all.end(), other.begin()));
+      }
+    }
+  }
+}
+
+#ifdef SIGMAIK_TEST_HEAP
+TEST_CASE("a batch on one thread uses no heap") {
+  Random random(5);
+  const Problem p = random_problem(random, 100, 6, 7);
+  std::vector<double> qdot(700);
+  std::vector<std::int8_t> status(100);
+  for (const Method& method : all_methods()) {
+    const test::HeapWatch watch;
+    solve_batch(method, 0.7, p.shape, p.jacobian.data(), p.twist.data(), qdot.data(), status.data());
+    CHECK(watch.calls() == 0);
+  }
+}
+#endif
 
 TEST_CASE("a problem that is not finite gives zero, and does not change the others") {
   Random random(2);

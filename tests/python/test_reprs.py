@@ -24,6 +24,8 @@ def shown() -> list[object]:
     ik.reset(q)
     stream = sk.TargetStream("predict")
     stream.push(0.0, servo.pose)
+    chunks = sk.ActionChunks(0.1)
+    chunks.push(0.0, [servo.pose])
     solver = sk.VelocitySolver(sk.DampedLeastSquares())
     spectrum = sk.Spectrum()
     spectrum.decompose(arm.jacobian(q))
@@ -47,6 +49,10 @@ def shown() -> list[object]:
         stream,
         stream.counts,
         stream.at(0.1),
+        sk.ServoBatch(arm, None, 1e-3, 4),
+        chunks,
+        chunks.counts,
+        chunks.at(0.1),
         solver,
         solver.solve(arm.jacobian(q), np.ones(6)),
         spectrum,

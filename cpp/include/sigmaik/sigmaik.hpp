@@ -26,7 +26,9 @@
 ///     singularities.hpp    SingularSets: known singular sets of three arms, potentials, manipulability in closed form
 ///     avoidance.hpp        Avoidance: a posture velocity away from singularities
 ///     servo.hpp            Servo: pose or twist in, joint command out, each cycle
+///     servo_batch.hpp      ServoBatch: many servos of one arm, a cycle of all of them in one call
 ///     target_stream.hpp    TargetStream: samples of a moving pose in, a smooth target out, each cycle
+///     action_chunks.hpp    ActionChunks: chunks of a policy's actions in, a smooth target out, each cycle
 ///     analytic_ik.hpp      AnalyticIk: every posture of a pose, for six joints with a spherical wrist
 ///     position_ik.hpp      PositionIk: joint positions of a pose, any chain, inside position limits
 ///     dynamics.hpp         Dynamics: mass matrix, Coriolis, gravity, payload
@@ -63,6 +65,7 @@
 ///
 /// Set-up throws Error. Calls marked "real time" are noexcept, bounded, and touch neither heap nor lock.
 
+#include <sigmaik/action_chunks.hpp>
 #include <sigmaik/analytic_ik.hpp>
 #include <sigmaik/avoidance.hpp>
 #include <sigmaik/batch.hpp>
@@ -81,6 +84,7 @@
 #include <sigmaik/position_ik.hpp>
 #include <sigmaik/rules.hpp>
 #include <sigmaik/servo.hpp>
+#include <sigmaik/servo_batch.hpp>
 #include <sigmaik/singularities.hpp>
 #include <sigmaik/spectrum.hpp>
 #include <sigmaik/status.hpp>

@@ -13,6 +13,12 @@
 #include <sigmaik/layout.hpp>
 #include <sigmaik/types.hpp>
 
+namespace sigmaik::detail {
+
+struct SpectrumParts;  // writes a decomposition that was found elsewhere (solve_batch)
+
+}  // namespace sigmaik::detail
+
 namespace sigmaik {
 
 /// Result and warm start of decompose(). No heap. Start afresh by assigning Spectrum{}.
@@ -51,6 +57,7 @@ class Spectrum {
   int sweeps() const noexcept { return sweeps_; }
 
  private:
+  friend struct detail::SpectrumParts;
   template <int kPadded>
   void decompose_padded(const TaskJacobianRef& jacobian) noexcept;
 

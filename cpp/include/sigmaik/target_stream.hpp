@@ -10,6 +10,17 @@
 #include <sigmaik/pose.hpp>
 #include <sigmaik/types.hpp>
 
+namespace sigmaik::detail {
+
+// A pose that moves.
+struct PoseMotion {
+  Pose pose = Pose::Identity();        // tip in base
+  Twist twist = Twist::Zero();         // [v; ω], base axes, at the pose's origin
+  Twist acceleration = Twist::Zero();  // derivative of the twist
+};
+
+}  // namespace sigmaik::detail
+
 namespace sigmaik {
 
 /// Where the target is between samples, and after the last one.
@@ -140,11 +151,7 @@ class TargetStream {
     double time = 0.0;
     Pose pose = Pose::Identity();  ///< tip in base
   };
-  struct Motion {
-    Pose pose = Pose::Identity();  ///< tip in base
-    Twist twist = Twist::Zero();
-    Twist acceleration = Twist::Zero();  ///< derivative of the twist
-  };
+  using Motion = detail::PoseMotion;
   // Covariance of position and velocity; each entry stands for a multiple of I₃.
   struct Covariance {
     double place, cross, velocity;
