@@ -219,7 +219,7 @@ void bind_kinematics(py::class_<Chain>& cls) {
             const int n = c.dof();
             return map_configurations(c.dof(), q, {n, 6, n}, [&](const JointVector& joints, double* out) {
               update(c, joints, state);
-              jacobian_gradient(state.jacobian, gradient);
+              jacobian_gradient(c, joints, state.jacobian, gradient);
               for (int k = 0; k < n; ++k) {
                 Eigen::Map<RowMajor<6>>(out + k * 6 * n, 6, n) = gradient[static_cast<std::size_t>(k)];
               }
