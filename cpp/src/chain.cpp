@@ -33,9 +33,11 @@ void check_limits(const Segment& s) {
   require(s.lower <= s.upper, label(s), ": lower = ", s.lower, " is above upper = ", s.upper);
   require(s.lower < kInfinity && s.upper > -kInfinity, label(s), ": no position lies between lower = ", s.lower,
           " and upper = ", s.upper);
-  const std::pair<const char*, double> positive[] = {
-      {"velocity", s.velocity},         {"acceleration", s.acceleration}, {"deceleration", s.deceleration},
-      {"jerk", s.jerk}, {"effort", s.effort}};
+  const std::pair<const char*, double> positive[] = {{"velocity", s.velocity},
+                                                     {"acceleration", s.acceleration},
+                                                     {"deceleration", s.deceleration},
+                                                     {"jerk", s.jerk},
+                                                     {"effort", s.effort}};
   for (const auto& [what, value] : positive) {
     check_bound(s, what, value);
     require(value > 0.0, label(s), ": ", what, " limit must be above 0 (infinite for none), got ", value);

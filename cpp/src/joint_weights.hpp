@@ -8,10 +8,10 @@
 //     q̇ = q̇_posture + W⁻¹ V λ,   (Vᵀ W⁻¹ V) λ = y.
 //
 // Singular values, thresholds and the twist that the rule does are those without weights: V is orthonormal, so the
-// system has no condition but that of W. Near a singularity, though, v_i of a singular direction turns quickly while y_i
-// vanishes, and the constraint v_iᵀ q̇ = y_i alone would shake the joints. So the constraint of a singular direction is
-// released as the direction is lost. With t_i = σ_i/w_i in [0, 1] (Resolution::weight; 1 where regular) and T = diag(t),
-// M = T Vᵀ W⁻¹ V T + I − T², M z = T y, the motion is
+// system has no condition but that of W. Near a singularity, though, v_i of a singular direction turns quickly while
+// y_i vanishes, and the constraint v_iᵀ q̇ = y_i alone would shake the joints. So the constraint of a singular direction
+// is released as the direction is lost. With t_i = σ_i/w_i in [0, 1] (Resolution::weight; 1 where regular) and T =
+// diag(t), M = T Vᵀ W⁻¹ V T + I − T², M z = T y, the motion is
 //
 //     q̇ = q̇_rule + (W⁻¹ V T z − V T z₀),   z and z₀ with W and with I,
 //

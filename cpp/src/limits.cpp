@@ -421,7 +421,8 @@ double LimitTracker::longest_settling() const noexcept {
     const auto at = static_cast<std::size_t>(i);
     const double range = upper_[at] - lower_[at], way = range < kInfinity ? range : kTurn;
     // The time of a motion with each limit alone adds up to more than that of a motion with all limits.
-    longest = std::max(longest, way / velocity_[at] + 2.0 * std::sqrt(way / std::min(acceleration_limit(i), deceleration_limit(i))) +
+    longest = std::max(longest, way / velocity_[at] +
+                                    2.0 * std::sqrt(way / std::min(acceleration_limit(i), deceleration_limit(i))) +
                                     4.0 * std::cbrt(way / (jerk_[at] * per_dt_ * per_dt_)));
   }
   return 3.0 + 3.0 * longest;
@@ -458,12 +459,11 @@ LimitTracker::Window LimitTracker::jerk_window(int i, bool& broken) noexcept {
   detail::JerkStop(v, s.slope, jerk_[at], brake).sample(1.0, s.next, s.next_slope);
   const double slack = kLimitTolerance * (1.0 + std::abs(q_[i])) * per_dt_;
   const double back = recovery(i, std::max({0.0, -above, -below}) * dt_);
-  const detail::JerkBound up = detail::upper_bound(
-      {v, s.change, s.next, s.next_slope, above, slack, velocity_[at], slope_limit(i, true), brake, jerk_[at], back,
-       settling});
-  const detail::JerkBound down = detail::upper_bound(
-      {-v, -s.change, -s.next, -s.next_slope, below, slack, velocity_[at], slope_limit(i, false), brake, jerk_[at],
-       back, settling});
+  const detail::JerkBound up = detail::upper_bound({v, s.change, s.next, s.next_slope, above, slack, velocity_[at],
+                                                    slope_limit(i, true), brake, jerk_[at], back, settling});
+  const detail::JerkBound down = detail::upper_bound({-v, -s.change, -s.next, -s.next_slope, below, slack,
+                                                      velocity_[at], slope_limit(i, false), brake, jerk_[at], back,
+                                                      settling});
   // The way back from one limit does not break another.
   Window window{std::min(-down.bound, up.safe), std::max(up.bound, -down.safe), down.kind, up.kind};
   if (window.lower > window.upper) {

@@ -69,8 +69,7 @@ JointVector Descent::curved_step(const DescentPoint& point, double damping, doub
   const JointVector scale = problem_.reach.cwiseSqrt();
   const Pose& tip = point.state.tip;
   const Row6 force = problem_.rows.force(tip, target_, shift_);
-  const JointMatrix h = curvature(problem_.chain, point, scale, force,
-                                  problem_.rows.stiffness(tip, target_, shift_));
+  const JointMatrix h = curvature(problem_.chain, point, scale, force, problem_.rows.stiffness(tip, target_, shift_));
   const JointVector slope = scale.cwiseProduct(point.state.jacobian.transpose() * force);
   double lambda = damping + 1e-13 * std::max(h.diagonal().cwiseAbs().sum(), 1e-280);
 

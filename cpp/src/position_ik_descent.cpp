@@ -1,5 +1,5 @@
-#include "mimic.hpp"
 #include "position_ik_descent.hpp"
+#include "mimic.hpp"
 
 #include <algorithm>
 #include <cmath>

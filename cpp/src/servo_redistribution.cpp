@@ -102,9 +102,8 @@ JointVector Servo::nearest(const JointVector& begin, const TaskJacobian& rows, c
       return begin.cwiseMax(bounds.lower).cwiseMin(bounds.upper);
     }
     // Clamp exactly: one ulp outside, and the next cycle's bounds could be empty.
-    const JointVector answer = (qdot + solution.x.head(n).cwiseQuotient(heavy))
-                                   .cwiseMax(bounds.lower)
-                                   .cwiseMin(bounds.upper);
+    const JointVector answer =
+        (qdot + solution.x.head(n).cwiseQuotient(heavy)).cwiseMax(bounds.lower).cwiseMin(bounds.upper);
     held |= solution.at_lower | solution.at_upper;
     if (pass == 1) {
       qdot = answer;

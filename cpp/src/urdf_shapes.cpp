@@ -65,9 +65,7 @@ std::vector<detail::LinkShape> shapes_of(const Chain& chain, const std::string& 
   tree.require_link("base", chain.base());
   // Tools (Chain::with_tool) are not in the file, and have no shapes.
   std::size_t count = chain.segments().size();
-  const auto is_tool = [&tree](const Segment& s) {
-    return s.type == JointType::Fixed && !tree.has_link(s.link_name);
-  };
+  const auto is_tool = [&tree](const Segment& s) { return s.type == JointType::Fixed && !tree.has_link(s.link_name); };
   while (count > 1 && is_tool(chain.segments()[count - 1])) --count;
   const std::string& tip = chain.segments()[count - 1].link_name;
   tree.require_link("tip", tip);

@@ -262,8 +262,10 @@ std::vector<double> numbers(const std::string& owner, const XMLElement& element,
     p = next;
   }
   if (!ok || values.size() != count) {
-    fail(owner, ": <", element.Name(), " ", attribute, "=\"", shortened(text),
-         "\">: ", count == 1 ? "one finite number is" : count == 3 ? "three finite numbers are" : "four finite numbers are",
+    fail(owner, ": <", element.Name(), " ", attribute, "=\"", shortened(text), "\">: ",
+         count == 1   ? "one finite number is"
+         : count == 3 ? "three finite numbers are"
+                      : "four finite numbers are",
          " needed",
          std::strchr(text, '$') != nullptr ? "; an expression of xacro's? run the file through xacro first" : "");
   }

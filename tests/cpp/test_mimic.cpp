@@ -165,12 +165,9 @@ TEST_CASE("a palletiser: the passive joints keep the tool upright, and the servo
     return s;
   };
   const Eigen::Vector3d y = Eigen::Vector3d::UnitY(), z = Eigen::Vector3d::UnitZ();
-  std::vector<Segment> segments{joint("turn", "a", z, {0, 0, 0.4}),
-                                joint("shoulder", "b", y, {0, 0, 0.1}),
-                                joint("back", "c", y, {0, 0, 0.8}),
-                                joint("elbow", "d", y, {0, 0, 0}),
-                                joint("level", "e", y, {0.7, 0, 0}),
-                                joint("tool", "tip", z, {0.1, 0, -0.1})};
+  std::vector<Segment> segments{joint("turn", "a", z, {0, 0, 0.4}),  joint("shoulder", "b", y, {0, 0, 0.1}),
+                                joint("back", "c", y, {0, 0, 0.8}),  joint("elbow", "d", y, {0, 0, 0}),
+                                joint("level", "e", y, {0.7, 0, 0}), joint("tool", "tip", z, {0.1, 0, -0.1})};
   segments[2].mimic = Mimic{"shoulder", -1.0, 0.0};  // the forearm keeps its direction when the shoulder moves
   segments[4].mimic = Mimic{"elbow", -1.0, 0.0};
   segments[4].lower = -0.8;

@@ -279,7 +279,8 @@ TEST_CASE("numbers") {
   check_facts(refusal(arm("<axis/>" + kLimit)), {"'j2'", "axis"});
   check_facts(refusal(arm("<origin xyz='0 2e6 0'/>" + kLimit)), {"'j2'", "2000000", "absurd"});
   check_facts(refusal(arm("<origin xyz='0 0 0'/><origin xyz='0 0 1'/>" + kLimit)), {"'j2'", "second <origin>"});
-  check_facts(refusal(arm("<origin xyz='0 0 0' rpy='0 0 0' quat_xyzw='0 0 0 1'/>" + kLimit)), {"'j2'", "quat_xyzw", "rpy"});
+  check_facts(refusal(arm("<origin xyz='0 0 0' rpy='0 0 0' quat_xyzw='0 0 0 1'/>" + kLimit)),
+              {"'j2'", "quat_xyzw", "rpy"});
   check_facts(refusal(arm("<origin quat_xyzw='0 0 0'/>" + kLimit)), {"'j2'", "quat_xyzw", "four finite"});
   check_facts(refusal(arm("<origin quat_xyzw='0 0 0 0'/>" + kLimit)), {"'j2'", "quat_xyzw", "length 0"});
   check_facts(refusal(arm("<origin quat_xyzw='0 0 1 1'/>" + kLimit)), {"'j2'", "quat_xyzw", "no rotation"});

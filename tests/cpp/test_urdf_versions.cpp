@@ -111,8 +111,9 @@ TEST_CASE("infinite limits are unlimited, as asked") {
 }
 
 TEST_CASE("a mimic joint of the arm moves with its joint, and its limits are its joint's") {
-  const Chain arm = read(robot("", "<limit lower='-1' upper='2' velocity='3' effort='4' acceleration='8'/>"
-                                   "<mimic joint='a' multiplier='-2' offset='0.5'/>"));
+  const Chain arm = read(robot("",
+                               "<limit lower='-1' upper='2' velocity='3' effort='4' acceleration='8'/>"
+                               "<mimic joint='a' multiplier='-2' offset='0.5'/>"));
   REQUIRE(arm.dof() == 2);
   CHECK(arm.joint_names() == std::vector<std::string>{"a", "c"});
   CHECK(arm.moving() == 3);

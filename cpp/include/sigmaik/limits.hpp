@@ -164,14 +164,15 @@ class LimitTracker {
   /// [rad/s² or m/s²], the acceleration limit of joint i that is held, the assumed one where the model has none;
   /// infinite where there is none.
   double acceleration_limit(int i) const noexcept { return acceleration_[static_cast<std::size_t>(i)] * per_dt_; }
-  /// [rad/s² or m/s²], the deceleration limit of joint i that is held, where it brakes; the acceleration limit where the
-  /// model has none.
+  /// [rad/s² or m/s²], the deceleration limit of joint i that is held, where it brakes; the acceleration limit where
+  /// the model has none.
   double deceleration_limit(int i) const noexcept { return braking_[static_cast<std::size_t>(i)] * per_dt_; }
   /// Whether acceleration or jerk limits are held: a command then takes time.
   bool delays() const noexcept { return has_jerk() || least_acceleration() < std::numeric_limits<double>::infinity(); }
   /// Whether a joint has a jerk limit that is held.
   bool has_jerk() const noexcept { return with_jerk_ != 0; }
-  /// [rad/s² or m/s²], the least of the acceleration and deceleration limits that are held; infinite where there is none.
+  /// [rad/s² or m/s²], the least of the acceleration and deceleration limits that are held; infinite where there is
+  /// none.
   double least_acceleration() const noexcept;
   /// [rad/s³ or m/s³], the least of the jerk limits that are held; infinite where there is none.
   double least_jerk() const noexcept;

@@ -86,8 +86,8 @@ struct ServoOptions {
   std::optional<double> length_scale{};  ///< [m], see VelocitySolver; none: Chain::characteristic_length()
   Task task{};                           ///< which rows of the twist matter, and in which axes
   /// (n,) > 0, how much the motion of each joint counts where the arm has more joints than the task has rows: a rail or
-  /// a base under the arm with the weight 1e4 moves only where the other joints cannot do the motion, because of a limit
-  /// or at a singularity. Only ratios matter. Empty: all 1. See VelocitySolver::set_joint_weights().
+  /// a base under the arm with the weight 1e4 moves only where the other joints cannot do the motion, because of a
+  /// limit or at a singularity. Only ratios matter. Empty: all 1. See VelocitySolver::set_joint_weights().
   JointVector joint_weights{};
   /// Whether the servo takes another way to a pose target that rests where its own way does not arrive; see Servo.
   bool guided = false;

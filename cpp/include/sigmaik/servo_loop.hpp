@@ -183,8 +183,8 @@ class ServoLoop {
   /// As follow().
   /// \param twist [v; ω], base axes, at the tip's origin
   void follow_twist(const Twist& twist, double timeout, LoopToken token = {});
-  /// Puts a tool on the tip from the next cycle on, without a jump: see Servo::set_tool(). The live command goes on, and
-  /// is then the tool's. The tool stays through configure(), until another. Takes no lock in the loop.
+  /// Puts a tool on the tip from the next cycle on, without a jump: see Servo::set_tool(). The live command goes on,
+  /// and is then the tool's. The tool stays through configure(), until another. Takes no lock in the loop.
   /// \throws Error where the tool is not a pose, or somebody else owns the arm
   void set_tool(const Pose& tool, LoopToken token = {});
   /// Stops the arm as fast as its limits allow, until the next command.
@@ -288,7 +288,7 @@ class ServoLoop {
   std::atomic_flag measuring_;
   std::int64_t measured_ = 0;  // [ns] since start(), of the last measurement; the loop's
 
-  Driver* driver_;           // the loop's
+  Driver* driver_;            // the loop's
   unsigned tools_taken_ = 0;  // the loop's: Command::tools of the tool that the servo has
   std::atomic<Driver*> incoming_{nullptr}, done_{nullptr};
 
