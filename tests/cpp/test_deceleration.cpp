@@ -38,11 +38,11 @@ class Watch {
   void step(double v) {
     const double change = (v - v_) / dt_;
     const auto judge = [&](double sign) {
-      if (sign * change > 0.0 || sign == 0.0) speeding = std::max(speeding, std::abs(change) / a_);
+      if (sign * change > 0.0) speeding = std::max(speeding, std::abs(change) / a_);
       if (sign * change < 0.0) braking = std::max(braking, std::abs(change) / b_);
     };
-    judge(v_);
-    judge(v);
+    judge(v_ != 0.0 ? v_ : v);
+    judge(v != 0.0 ? v : v_);
     v_ = v;
   }
   double speeding = 0.0, braking = 0.0;
