@@ -365,8 +365,8 @@ double LimitTracker::slope_limit(int i, bool upwards) const noexcept {
   const double least = std::min(a, b), speed = std::abs(v_[i]), j = jerk_[at];
   const bool brakes = upwards ? v_[i] < 0.0 : v_[i] > 0.0;
   if (!brakes) return std::min(a, std::sqrt(least * least + 2.0 * j * speed));
-  const double slope = std::sqrt(least * least + 2.0 * j * std::max(0.0, speed - least));
-  return std::min({b, slope, std::max(least, speed)});
+  const double slope = std::sqrt(least * (least + j) + 0.25 * j * j + 2.0 * j * std::max(0.0, speed - least)) - 0.5 * j;
+  return std::min({b, std::max(least, slope), std::max(least, speed)});
 }
 
 // Time of braking and time of speeding up add up; the cycle at hand has the limit of what it does.

@@ -25,8 +25,10 @@
 ///
 /// and the highest v + A dt, where B < A v + min(A dt, B dt + v): so the bounds are continuous in v, and both limits
 /// hold whether the sign before or after the cycle says what braking is. v − B dt stays allowed where v ≥ B dt, else 0,
-/// so D works as before. With a jerk limit the slope at velocity v is at most √(min(A, B)² + 2 J |v|), the slope from
-/// which the jerk leads to min(A, B) at the standstill; stops use B.
+/// so D works as before. With a jerk limit a joint that
+/// brakes changes its velocity by at most c a cycle, c² + c J dt² = m² + m J dt² + 2 J dt² (|v| − m) with the smaller
+/// limit m (and c = m where |v| ≤ m): these are the changes that can fall to m by J dt² a cycle before the joint turns
+/// round, by the sum D of changes in place of velocities. A joint that speeds up has √(m² + 2 J dt² |v|). Stops use B.
 ///
 /// *With a jerk limit.* The tracker keeps a stop: the continuous velocity that starts with the present v and a slope s
 /// and comes to rest in the least time under |v'| ≤ A, |v''| ≤ J.
