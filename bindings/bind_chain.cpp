@@ -1,6 +1,8 @@
 #include <cmath>
 #include <locale>
+#include <map>
 #include <sstream>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -39,6 +41,9 @@ void bind_limits(py::module_& m) {
           "velocity", [](const JointLimits& l) { return to_numpy(l.velocity); }, "(n,) [rad/s or m/s]")
       .def_property_readonly(
           "acceleration", [](const JointLimits& l) { return to_numpy(l.acceleration); }, "(n,) [rad/s² or m/s²]")
+      .def_property_readonly(
+          "deceleration", [](const JointLimits& l) { return to_numpy(l.braking()); },
+          "(n,) [rad/s² or m/s²], of a joint that becomes slower: the acceleration where none is given.")
       .def_property_readonly(
           "jerk", [](const JointLimits& l) { return to_numpy(l.jerk); }, "(n,) [rad/s³ or m/s³]")
       .def_property_readonly(
@@ -105,6 +110,14 @@ void bind_segment(py::module_& m) {
       .def_property_readonly(
           "axis", [](const Segment& s) { return to_numpy(s.axis); }, "(3,) unit vector in the joint's frame")
       .def_readonly("inertia", &Segment::inertia, "Of the link, None where it is not known.")
+      .def_property_readonly(
+          "mimic",
+          [](const Segment& s) -> std::optional<std::tuple<std::string, double, double>> {
+            if (!s.mimic) return std::nullopt;
+            return std::tuple{s.mimic->joint, s.mimic->multiplier, s.mimic->offset};
+          },
+          "(joint, multiplier, offset) of a joint that moves with another: multiplier · (its position) + offset; else "
+          "None.")
       .def("__repr__", [](const Segment& s) {
         return "Segment('" + s.joint_name + "' carries '" + s.link_name + "', " + to_string(s.type) + ")";
       });
@@ -134,10 +147,11 @@ void bind_from_urdf(py::class_<Chain>& cls) {
       "Reads a URDF.\n\n"
       "source: a file's path, or the XML text.\n"
       "base, tip: link names; by default the root, and the only leaf.\n"
-      "acceleration: (n,) limits [rad/s² or m/s²]; by default those of the file, whose <limit> elements may carry\n"
-      "an attribute `acceleration` (an extension), else infinite.\n\n"
+      "acceleration: (n,) limits [rad/s² or m/s²]; by default those of the file (URDF 1.2), else infinite.\n\n"
       "Raises Error with the facts for anything that is not a usable serial arm of 1 to 16 movable joints, and warns\n"
-      "(ModelWarning) of velocity limits of zero, which count as none, and of inertias that no rigid body has.");
+      "(ModelWarning) of velocity limits of zero, which count as none, of joints that mimic a joint beside the arm, "
+      "which\n"
+      "move by themselves, and of inertias that no rigid body has.");
 }
 
 void bind_parts(py::class_<Chain>& cls) {
@@ -177,17 +191,37 @@ void bind_parts(py::class_<Chain>& cls) {
       .def(
           "with_limits",
           [](const Chain& c, const MaybeArray& lower, const MaybeArray& upper, const MaybeArray& velocity,
-             const MaybeArray& acceleration, const MaybeArray& jerk, const MaybeArray& effort) {
+             const MaybeArray& acceleration, const MaybeArray& deceleration, const MaybeArray& jerk,
+             const MaybeArray& effort) {
             const JointLimits& old = c.limits();
             return c.with_limits({limit_argument(lower, "lower", old.lower), limit_argument(upper, "upper", old.upper),
                                   limit_argument(velocity, "velocity", old.velocity),
                                   limit_argument(acceleration, "acceleration", old.acceleration),
-                                  limit_argument(jerk, "jerk", old.jerk),
-                                  limit_argument(effort, "effort", old.effort)});
+                                  limit_argument(jerk, "jerk", old.jerk), limit_argument(effort, "effort", old.effort),
+                                  limit_argument(deceleration, "deceleration", old.deceleration)});
           },
           py::kw_only(), py::arg("lower") = py::none(), py::arg("upper") = py::none(), py::arg("velocity") = py::none(),
-          py::arg("acceleration") = py::none(), py::arg("jerk") = py::none(), py::arg("effort") = py::none(),
-          "The same arm with other limits: (n,) or one number each, infinite for none; None keeps what there is.");
+          py::arg("acceleration") = py::none(), py::arg("deceleration") = py::none(), py::arg("jerk") = py::none(),
+          py::arg("effort") = py::none(),
+          "The same arm with other limits: (n,) or one number each, infinite for none; None keeps what there is.\n\n"
+          "A continuous joint with a position limit (a cable) becomes a revolute joint. deceleration: of a joint that\n"
+          "becomes slower; infinite: as the acceleration.")
+      .def(
+          "with_tool",
+          [](const Chain& c, const py::object& pose, const std::optional<Inertia>& inertia) {
+            return c.with_tool(pose_argument(pose, "pose"), inertia);
+          },
+          py::arg("pose"), py::arg("inertia") = py::none(),
+          "The same arm with a tool, whose frame is the new tip.\n\n"
+          "pose: (4, 4), the tool's frame in the tip.\n"
+          "inertia: Inertia of the tool, in the tool's frame; Dynamics uses it. None: not known.")
+      .def(
+          "lock", [](const Chain& c, const std::map<std::string, double>& positions) { return c.lock(positions); },
+          py::arg("positions"),
+          "The same arm with joints that do not move any more: {name: position [rad or m]}. q has fewer entries.\n\n"
+          "Links and inertias stay. Raises Error where a name is not in joint_names, a position is outside its "
+          "limits,\n"
+          "or no joint is left.");
 }
 
 void bind_kinematics(py::class_<Chain>& cls) {
@@ -219,7 +253,7 @@ void bind_kinematics(py::class_<Chain>& cls) {
             const int n = c.dof();
             return map_configurations(c.dof(), q, {n, 6, n}, [&](const JointVector& joints, double* out) {
               update(c, joints, state);
-              jacobian_gradient(state.jacobian, gradient);
+              jacobian_gradient(c, joints, state.jacobian, gradient);
               for (int k = 0; k < n; ++k) {
                 Eigen::Map<RowMajor<6>>(out + k * 6 * n, 6, n) = gradient[static_cast<std::size_t>(k)];
               }

@@ -182,6 +182,18 @@ void bind_cycle(py::class_<Servo>& c) {
       .def_property_readonly("rough_targets", &Servo::rough_targets,
                              "Targets of update() whose rotation was off by more than rounding (up to 5e-4 in RᵀR), "
                              "and was made one.")
+      .def(
+          "set_tool",
+          [](Servo& s, const py::object& tool) {
+            if (!s.set_tool(pose_argument(tool, "tool"))) throw Error("the tool is not a pose");
+          },
+          py::arg("tool"),
+          "Puts a tool on the tip from the next cycle on: targets, twists and poses are then those of its frame.\n\n"
+          "tool: (4, 4) in the chain's tip; the identity takes the tool off. q̇ does not jump: the command is faded in\n"
+          "from the last velocity over soft_start, inside all limits. For Dynamics use chain.with_tool(pose, inertia).")
+      .def_property_readonly(
+          "tool", [](const Servo& s) { return to_numpy(s.tool().matrix()); },
+          "(4, 4) of set_tool(), in the chain's tip.")
       .def("hold", &Servo::hold, "One cycle of the fastest stop that the limits allow, or of rest: HOLDING.")
       .def("continue_from", &Servo::continue_from, py::arg("other"),
            "Takes over from another servo of the same arm and dt, in the midst of its motion.\n\n"

@@ -290,6 +290,14 @@ void bind_targets(py::class_<ServoLoop>& c) {
           "Follows a twist (6,) [v; ω], base axes, at the tip's origin, for `timeout` [s] (up to 60) unless it is said "
           "again.\n\n"
           "Raises Error as follow() does.")
+      .def(
+          "set_tool",
+          [](ServoLoop& loop, const py::object& tool, const std::optional<LoopToken>& token) {
+            loop.set_tool(pose_argument(tool, "tool"), token_of(token));
+          },
+          py::arg("tool"), py::arg("token") = py::none(),
+          "Puts a tool (4, 4) on the tip from the next cycle on, without a jump: see Servo.set_tool.\n\n"
+          "The live command goes on, and is then the tool's.")
       .def("hold", &ServoLoop::hold, "Stops as fast as limits allow, and rests until the next command.")
       .def(
           "configure",

@@ -118,6 +118,17 @@ void bind_velocity_solver(py::module_& m) {
           "posture: (n,) q̇ [rad/s or m/s], goes through the method's own projector.\n"
           "rotation: (3, 3) tip in base, needed where frame is 'tool'.\n\n"
           "Raises Error where a shape is wrong or an entry is not finite.")
+      .def(
+          "set_joint_weights",
+          [](VelocitySolver& s, const MaybeArray& weights) {
+            if (!weights) return s.set_joint_weights(JointVector());
+            const Array w = array_argument(*weights, "weights", {-1}, "(n,)");
+            if (w.size() > kMaxJoints) throw Error("weights has more than 16 entries");
+            s.set_joint_weights(JointVector(Eigen::Map<const Eigen::VectorXd>(w.data(), w.size())));
+          },
+          py::arg("weights"),
+          "How much each joint's motion counts: of all motions that move the tip as the rule says, the answer has the\n"
+          "least Σ w_j (q̇_j − posture_j)². weights: (n,) > 0, only ratios matter; None: all 1.")
       .def("reset", &VelocitySolver::reset, "Forgets the warm start.")
       .def_property("method", &VelocitySolver::method, &VelocitySolver::set_method, "The rule; may be changed.")
       .def_property_readonly("length_scale", &VelocitySolver::length_scale, "[m]")

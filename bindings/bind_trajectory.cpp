@@ -426,6 +426,15 @@ void bind_trajectory(py::module_& m) {
   c.def("__len__", &Trajectory::size).def("__repr__", &trajectory_text);
   bind_playback(m);
   bind_clearance_function(m);
+  m.def(
+      "nearest_turn",
+      [](const Chain& chain, const ArrayLike& start, const ArrayLike& goal) {
+        const int n = chain.dof();
+        return to_numpy(
+            planning::nearest_turn(chain, joint_argument(start, "start", n), joint_argument(goal, "goal", n)));
+      },
+      py::arg("chain"), py::arg("start"), py::arg("goal"),
+      "The goal (n,) with each continuous joint on the turn nearest to the start, at most π away.");
 }
 
 }  // namespace sigmaik::bindings

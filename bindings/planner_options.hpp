@@ -31,6 +31,8 @@ struct Fields<planning::TimeOptimalOptions> {
       field("clearance_width", &Options::clearance_width,
             "[1/rad²] > 0: sets of codimension above 1 count as crossed where ψ < 1/(2 clearance_width). Where a call "
             "has eta2, its default is eta2."),
+      field("whole_turns", &Options::whole_turns,
+            "whether goals count whole turns. False: continuous joints take the shorter way, of at most half a turn."),
   };
 };
 
@@ -50,6 +52,8 @@ struct Fields<planning::GradientOptions> {
       field("duration", &Options::duration,
             "[s] > 0. None: the shortest that keeps the limits of velocity and acceleration, 1 s where there are "
             "none."),
+      field("whole_turns", &Options::whole_turns,
+            "whether goals count whole turns. False: continuous joints take the shorter way, of at most half a turn."),
   };
 };
 
@@ -69,6 +73,8 @@ struct Fields<planning::StochasticOptions> {
             "≥ 0: the search stops where eight iterations together gain less than this part of the objective."),
       field("refine", &Options::refine, "whether `gradient` finishes the motion that the samples found."),
       field("duration", &Options::duration, "[s] as for `gradient`."),
+      field("whole_turns", &Options::whole_turns,
+            "whether goals count whole turns. False: continuous joints take the shorter way, of at most half a turn."),
   };
 };
 

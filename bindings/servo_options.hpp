@@ -99,6 +99,10 @@ struct Fields<ServoOptions> {
       field("length_scale", &ServoOptions::length_scale,
             "[m] > 0: 1 rad/s weighs as much as length_scale m/s, as for VelocitySolver. None: "
             "chain.characteristic_length."),
+      field(
+          "joint_weights", &ServoOptions::joint_weights,
+          "(n,) > 0, how much each joint's motion counts where there are more joints than rows: a rail with 1e4 moves "
+          "only where the other joints cannot do the motion. Only ratios matter. None: all 1."),
       field("guided", &ServoOptions::guided,
             "whether the servo takes another way to a pose target that rests where its own way does not arrive: "
             "through another configuration of the arm, if need be away from the tool's straight line. `step.guide` "

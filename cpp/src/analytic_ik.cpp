@@ -273,6 +273,7 @@ struct AnalyticSetup {
 AnalyticIk::AnalyticIk(const Chain& chain) : chain_(chain) {
   detail::require(chain.dof() == 6, "closed-form inverse kinematics needs 6 joints; from '", chain.base(), "' to '",
                   chain.tip(), "' there are ", chain.dof());
+  detail::require(!chain.has_mimics(), "closed-form inverse kinematics needs joints that move by themselves");
   AnalyticSetup(*this).run();
 }
 

@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "message.hpp"
+#include "mimic.hpp"
 #include "numbers.hpp"
 #include "rigid_body.hpp"
 
@@ -32,8 +33,11 @@ void check_limits(const Segment& s) {
   require(s.lower <= s.upper, label(s), ": lower = ", s.lower, " is above upper = ", s.upper);
   require(s.lower < kInfinity && s.upper > -kInfinity, label(s), ": no position lies between lower = ", s.lower,
           " and upper = ", s.upper);
-  const std::pair<const char*, double> positive[] = {
-      {"velocity", s.velocity}, {"acceleration", s.acceleration}, {"jerk", s.jerk}, {"effort", s.effort}};
+  const std::pair<const char*, double> positive[] = {{"velocity", s.velocity},
+                                                     {"acceleration", s.acceleration},
+                                                     {"deceleration", s.deceleration},
+                                                     {"jerk", s.jerk},
+                                                     {"effort", s.effort}};
   for (const auto& [what, value] : positive) {
     check_bound(s, what, value);
     require(value > 0.0, label(s), ": ", what, " limit must be above 0 (infinite for none), got ", value);
@@ -107,18 +111,20 @@ void prepare(const std::string& base, std::vector<Segment>& segments) {
 
 // See Chain::characteristic_length(). From the tip to the base: mean and second moment of the vector from a joint's
 // origin to the tip, in this joint's frame, averaged over a full turn of the joints after it.
-double lever_arm(const std::array<JointConstants, kMaxJoints>& joints, int dof, const Pose& tool,
-                 const JointLimits& limits) {
+double lever_arm(const std::array<JointConstants, kMaxJoints>& joints, int moving,
+                 const std::array<Coupling, kMaxJoints>& couplings, const Pose& tool, const JointLimits& limits) {
   Eigen::Vector3d mean = tool.translation();
   Eigen::Matrix3d moment = mean * mean.transpose();
   double sum = 0.0;
   int turning = 0;
-  for (int i = dof - 1; i >= 0; --i) {
+  for (int i = moving - 1; i >= 0; --i) {
     const JointConstants& joint = joints[static_cast<std::size_t>(i)];
     if (joint.prismatic) {
-      const bool bounded = std::isfinite(limits.lower[i]) && std::isfinite(limits.upper[i]);
-      const double middle = bounded ? 0.5 * (limits.lower[i] + limits.upper[i]) : 0.0;
-      const double range = bounded ? limits.upper[i] - limits.lower[i] : 0.0;
+      const Coupling& c = couplings[static_cast<std::size_t>(i)];
+      const double low = limits.lower[c.joint], high = limits.upper[c.joint];
+      const bool bounded = std::isfinite(low) && std::isfinite(high);
+      const double middle = bounded ? c.multiplier * (0.5 * (low + high)) + c.offset : 0.0;
+      const double range = bounded ? c.multiplier * (high - low) : 0.0;
       const Eigen::Vector3d slide = middle * Eigen::Vector3d::UnitZ();
       moment += mean * slide.transpose() + slide * mean.transpose() + slide * slide.transpose();
       moment(2, 2) += range * range / 12.0;
@@ -161,41 +167,52 @@ Chain::Chain(std::string base, std::vector<Segment> segments) {
       model->warnings.push_back("link '" + s.link_name + "': its inertia is no rigid body's: " + defect);
     }
   }
-  const auto is_movable = [](const Segment& s) { return s.type != JointType::Fixed; };
-  const int n = static_cast<int>(std::count_if(segments.begin(), segments.end(), is_movable));
-  model->dof = n;
+  const std::vector<Coupling> couplings = detail::couplings_of(segments);
+  detail::fold_limits(couplings, segments);
+  // The number in q of each segment's joint, where the joint moves by itself.
+  std::vector<int> number(segments.size(), -1);
+  for (std::size_t k = 0; k < segments.size(); ++k) {
+    if (segments[k].type == JointType::Fixed) continue;
+    ++model->moving;
+    if (!segments[k].mimic) number[k] = model->dof++;
+  }
   JointLimits& limits = model->limits;
-  for (JointVector* v :
-       {&limits.lower, &limits.upper, &limits.velocity, &limits.acceleration, &limits.jerk, &limits.effort}) {
-    v->resize(n);
+  for (JointVector* v : {&limits.lower, &limits.upper, &limits.velocity, &limits.acceleration, &limits.deceleration,
+                         &limits.jerk, &limits.effort}) {
+    v->resize(model->dof);
   }
 
   // All origins between two movable joints become one constant transform, in frames whose z lies along the axis.
   Pose placement = Pose::Identity();
-  int i = 0;
-  for (const Segment& s : segments) {
+  std::size_t moved = 0;
+  for (std::size_t k = 0; k < segments.size(); ++k) {
+    const Segment& s = segments[k];
     placement = placement * s.origin;
     if (s.type == JointType::Fixed) continue;
     const Eigen::Matrix3d turn = from_z(s.axis);
     placement.linear() = placement.linear() * turn;
-    JointConstants& c = model->constants[static_cast<std::size_t>(i)];
+    model->couplings[moved] = {number[static_cast<std::size_t>(couplings[k].joint)], couplings[k].multiplier,
+                               couplings[k].offset};
+    JointConstants& c = model->constants[moved++];
     c.rotation = placement.linear();
     c.translation = placement.translation();
     c.prismatic = s.type == JointType::Prismatic;
     placement = Pose::Identity();
     placement.linear() = turn.transpose();
+    const int i = number[k];
+    if (i < 0) continue;
     limits.lower[i] = s.lower;
     limits.upper[i] = s.upper;
     limits.velocity[i] = s.velocity;
     limits.acceleration[i] = s.acceleration;
+    limits.deceleration[i] = s.deceleration;
     limits.jerk[i] = s.jerk;
     limits.effort[i] = s.effort;
     model->joint_names.push_back(s.joint_name);
     model->joint_types.push_back(s.type);
-    ++i;
   }
   model->tool = placement;
-  model->characteristic_length = lever_arm(model->constants, n, placement, limits);
+  model->characteristic_length = lever_arm(model->constants, model->moving, model->couplings, placement, limits);
   model->base = std::move(base);
   model->segments = std::move(segments);
   model_ = std::move(model);
@@ -209,16 +226,20 @@ Chain Chain::with_limits(const JointLimits& limits) const {
   for (const auto& [what, values] : all) {
     require(values->size() == dof(), what, " has ", values->size(), " entries, the chain ", dof(), " joints");
   }
+  const auto given = limits.deceleration.size();
+  require(given == 0 || given == dof(), "deceleration has ", given, " entries, the chain ", dof(), " joints");
   std::vector<Segment> segments = model_->segments;
   int i = 0;
   for (Segment& s : segments) {
-    if (s.type == JointType::Fixed) continue;
-    require(s.type != JointType::Continuous || (limits.lower[i] == -kInfinity && limits.upper[i] == kInfinity),
-            label(s), " is continuous: it cannot have position limits");
+    if (s.type == JointType::Fixed || s.mimic) continue;
+    // With a bound a joint's positions are not the same modulo 2π any more.
+    const bool bounded = limits.lower[i] != -kInfinity || limits.upper[i] != kInfinity;
+    if (s.type == JointType::Continuous && bounded) s.type = JointType::Revolute;
     s.lower = limits.lower[i];
     s.upper = limits.upper[i];
     s.velocity = limits.velocity[i];
     s.acceleration = limits.acceleration[i];
+    s.deceleration = given != 0 ? limits.deceleration[i] : kInfinity;
     s.jerk = limits.jerk[i];
     s.effort = limits.effort[i];
     s.notes.clear();  // the notes are about the limits that the new ones replace

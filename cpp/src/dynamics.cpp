@@ -23,20 +23,18 @@ Eigen::Map<Eigen::MatrixXd> entries(KDL::JntSpaceInertiaMatrix& matrix) {
   return {matrix.data.data(), matrix.data.rows(), matrix.data.cols()};
 }
 
-KDL::JntArray joints(const JointRef& values, int n, const char* what) {
-  detail::require(values.size() == n, what, " has ", values.size(), " entries, the chain ", n, " joints");
-  KDL::JntArray array(static_cast<unsigned>(n));
-  entries(array) = values;
-  return array;
-}
-
 }  // namespace
 
 struct Dynamics::Model {
   KDL::Chain chain;  // declared before the solvers, which keep a reference to the chain
   KDL::ChainDynParam solver;
   KDL::ChainIdSolver_RNE recursion;
+  // With joints that mimic others, θ = A q + offset are the positions of all joints that move, which KDL knows: then
+  // τ = Aᵀ τ_θ and M = Aᵀ M_θ A (the principle of virtual work).
+  bool mimics;
   int dof;
+  JointMatrix coupling;
+  JointVector offset;
   KDL::JntArray q, qdot, qddot, torque;  // memory of the real-time calls
   KDL::JntSpaceInertiaMatrix mass;
   const KDL::Wrenches no_wrenches;
@@ -46,14 +44,46 @@ struct Dynamics::Model {
       : chain(loaded(arm, payload)),
         solver(chain, gravity),
         recursion(chain, gravity),
+        mimics(arm.has_mimics()),
         dof(arm.dof()),
+        coupling(arm.coupling_matrix()),
+        offset(arm.moving()),
         q(size()),
         qdot(size()),
         qddot(size()),
         torque(size()),
         mass(size()),
-        no_wrenches(chain.getNrOfSegments(), KDL::Wrench::Zero()) {}
-  unsigned size() const { return static_cast<unsigned>(dof); }
+        no_wrenches(chain.getNrOfSegments(), KDL::Wrench::Zero()) {
+    for (int i = 0; i < arm.moving(); ++i) offset[i] = arm.couplings()[static_cast<std::size_t>(i)].offset;
+  }
+  unsigned size() const { return static_cast<unsigned>(coupling.rows()); }
+
+  void put_positions(const JointRef& from, KDL::JntArray& to) const {
+    put(from, to);
+    if (mimics) entries(to) += offset;
+  }
+  // Velocities or accelerations.
+  void put(const JointRef& from, KDL::JntArray& to) const {
+    if (mimics) {
+      entries(to) = coupling.lazyProduct(from);
+    } else {
+      entries(to) = from;
+    }
+  }
+  JointVector torque_of(const Eigen::Map<Eigen::VectorXd>& from) const {
+    return mimics ? JointVector(coupling.transpose().lazyProduct(from)) : JointVector(from);
+  }
+  JointMatrix mass_of(const Eigen::Map<Eigen::MatrixXd>& from) const {
+    if (!mimics) return from;
+    const JointMatrix half = from.lazyProduct(coupling), whole = coupling.transpose().lazyProduct(half);
+    return 0.5 * (whole + whole.transpose());
+  }
+  KDL::JntArray checked(const JointRef& values, const char* what, bool positions) const {
+    detail::require(values.size() == dof, what, " has ", values.size(), " entries, the chain ", dof, " joints");
+    KDL::JntArray array(size());
+    positions ? put_positions(values, array) : put(values, array);
+    return array;
+  }
 
   // The payload becomes an additional link that is fixed to the tip.
   static KDL::Chain loaded(const Chain& arm, const std::optional<Inertia>& payload) {
@@ -108,21 +138,21 @@ int Dynamics::dof() const noexcept { return model_->dof; }
 
 void Dynamics::evaluate(const JointRef& q, const JointRef& qdot, DynamicsTerms& terms) noexcept {
   Model& m = *model_;
-  entries(m.q) = q;
-  entries(m.qdot) = qdot;
+  m.put_positions(q, m.q);
+  m.put(qdot, m.qdot);
   m.solver.JntToMass(m.q, m.mass);
-  terms.mass = entries(m.mass);
+  terms.mass = m.mass_of(entries(m.mass));
   entries(m.qddot).setZero();
-  terms.bias = m.recurse();
+  terms.bias = m.torque_of(m.recurse());
 }
 
 void Dynamics::inverse_dynamics(const JointRef& q, const JointRef& qdot, const JointRef& qddot,
                                 JointVector& torque) noexcept {
   Model& m = *model_;
-  entries(m.q) = q;
-  entries(m.qdot) = qdot;
-  entries(m.qddot) = qddot;
-  torque = m.recurse();
+  m.put_positions(q, m.q);
+  m.put(qdot, m.qdot);
+  m.put(qddot, m.qddot);
+  torque = m.torque_of(m.recurse());
 }
 
 bool Dynamics::forward_dynamics(const JointRef& q, const JointRef& qdot, const JointRef& torque,
@@ -138,20 +168,20 @@ bool Dynamics::forward_dynamics(const JointRef& q, const JointRef& qdot, const J
 
 JointMatrix Dynamics::mass_matrix(const JointRef& q) const {
   KDL::JntSpaceInertiaMatrix mass(model_->size());
-  model_->solver.JntToMass(joints(q, model_->dof, "q"), mass);
-  return entries(mass);
+  model_->solver.JntToMass(model_->checked(q, "q", true), mass);
+  return model_->mass_of(entries(mass));
 }
 
 JointVector Dynamics::coriolis(const JointRef& q, const JointRef& qdot) const {
   KDL::JntArray torque(model_->size());
-  model_->solver.JntToCoriolis(joints(q, model_->dof, "q"), joints(qdot, model_->dof, "qdot"), torque);
-  return entries(torque);
+  model_->solver.JntToCoriolis(model_->checked(q, "q", true), model_->checked(qdot, "qdot", false), torque);
+  return model_->torque_of(entries(torque));
 }
 
 JointVector Dynamics::gravity(const JointRef& q) const {
   KDL::JntArray torque(model_->size());
-  model_->solver.JntToGravity(joints(q, model_->dof, "q"), torque);
-  return entries(torque);
+  model_->solver.JntToGravity(model_->checked(q, "q", true), torque);
+  return model_->torque_of(entries(torque));
 }
 
 }  // namespace sigmaik

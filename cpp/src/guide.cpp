@@ -85,6 +85,13 @@ void Guide::set_method(const Method& method) {
   forget();
 }
 
+void Guide::set_tool(const Pose& tool) noexcept {
+  predictor_.set_tool(tool);
+  with_tool_ = tool.matrix() != Pose::Identity().matrix();
+  without_tool_ = tool.inverse(Eigen::Isometry);
+  forget();
+}
+
 void Guide::begin(const Pose& target) noexcept {
   target_ = target;
   restart();
@@ -128,13 +135,17 @@ bool Guide::same(const Pose& target) noexcept {
   if (moved.head<3>().norm() <= kSameTarget * length && moved.tail<3>().norm() <= kSameTarget) return true;
   if (phase_ != Phase::Leading && !(phase_ == Phase::Following && with_posture_)) return false;
   if (moved.head<3>().norm() > 0.1 * length || moved.tail<3>().norm() > 0.1) return false;
-  if (!follow_solution(ik_, target, goal_)) return false;
+  if (!follow_solution(ik_, tip_at(target), goal_)) return false;
   target_ = target;
   return true;
 }
 
 void Guide::advise(const Pose& target, const Twist& error, const Servo& servo) noexcept {
   const double dt = servo.options().dt;
+  if (with_tool_ && !servo.options().task.whole()) {  // the search has the tip's rows, and not the tool's
+    state_ = GuideState::Off;
+    return;
+  }
   const Left now = left(error, servo);
   if (!same(target)) begin(target);
   if (servo.options().gain_linear == 0.0 || servo.options().gain_angular == 0.0) return;  // a way of the user's own
@@ -254,7 +265,7 @@ bool Guide::search(const Servo& servo) noexcept {
     const bool large = target_.translation().cwiseAbs().maxCoeff() > kLargest ||
                        servo.q().cwiseAbs().maxCoeff() > kLargest;
     if (large) return searched_ = true;
-    search_.emplace(ik_, target_, servo.q());
+    search_.emplace(ik_, tip_at(target_), servo.q());
   }
   for (; slices_ >= 1.0 && !searched_; slices_ -= 1.0) searched_ = search_->advance();
   return searched_;

@@ -28,6 +28,8 @@ class Guide {
   void forget() noexcept { phase_ = Phase::Nothing; }
   // See Servo::set_method().
   void set_method(const Method& method);
+  // See Servo::set_tool().
+  void set_tool(const Pose& tool) noexcept;
 
   // One slice. `error`: pose_error from the tip to the target.
   void advise(const Pose& target, const Twist& error, const Servo& servo) noexcept;
@@ -67,12 +69,17 @@ class Guide {
   double own_time(const Left& left, const Servo& servo) const noexcept;
   double travel_time(const JointVector& from) const noexcept;
 
+  // The tip's pose where the tool is at `target`.
+  Pose tip_at(const Pose& target) const noexcept { return with_tool_ ? target * without_tool_ : target; }
+
   Servo predictor_;
   PositionIk ik_;
   std::optional<NearestSearch> search_;
   Phase phase_ = Phase::Nothing;
   GuideState state_ = GuideState::Off;
   Pose target_ = Pose::Identity();
+  Pose without_tool_ = Pose::Identity();  // the tip in the tool
+  bool with_tool_ = false;
   JointVector goal_;           // joint positions of the target
   JointVector end_;            // of the servo's own way
   bool searched_ = false;      // the search has ended

@@ -102,7 +102,32 @@ double IndexFunction::value(const TaskJacobianRef& jacobian) const noexcept {
 double IndexFunction::value(const Chain& chain, const JointRef& q, JointVector& out) const noexcept {
   ChainState state;
   update(chain, q, state);
-  return gradient(state.jacobian, out);
+  if (!chain.has_mimics()) return gradient(state.jacobian, out);
+  Jacobian slope;
+  const double value = this->slope(state.jacobian, slope);
+  JacobianGradient d;
+  jacobian_gradient(chain, q, state.jacobian, d);
+  out.resize(chain.dof());
+  for (int k = 0; k < chain.dof(); ++k) out[k] = slope.cwiseProduct(d[static_cast<std::size_t>(k)]).sum();
+  return value;
+}
+
+double IndexFunction::slope(const Jacobian& jacobian, Jacobian& slope) const noexcept {
+  Jacobian weighted = jacobian;
+  weighted.bottomRows<3>() *= angular_;
+  if (whiten_.size() != 0) weighted = whiten_.lazyProduct(weighted).eval();
+  Spectrum spectrum;
+  spectrum.decompose(weighted);
+  double of_sigma[kMaxTask];
+  const double value = from_sigma(index_, inverse_k_, spectrum, of_sigma);
+  slope.setZero(6, jacobian.cols());
+  for (int i = 0; i < spectrum.size(); ++i) {
+    Eigen::Matrix<double, 6, 1> u = of_sigma[i] * spectrum.u(i);
+    if (whiten_.size() != 0) u = whiten_.lazyProduct(u).eval();
+    u.tail<3>() *= angular_;
+    slope += u * spectrum.v(i).transpose();
+  }
+  return value;
 }
 
 // With J_j = [v_j; ω_j], ∂_kJ x = [ω_k × Σ_{j≥k} v_j x_j + (Σ_{j<k} ω_j x_j) × v_k; ω_k × Σ_{j≥k} ω_j x_j]: running
@@ -164,7 +189,7 @@ double reference_scale(const Chain& chain, double length_scale) {
     spectrum.decompose(weighted);
     if (gradient != nullptr) {
       JacobianGradient d;
-      jacobian_gradient(state.jacobian, d);
+      jacobian_gradient(chain, q, state.jacobian, d);
       Eigen::Matrix<double, 6, 1> u = spectrum.u(0);
       u.tail<3>() *= length_scale;
       for (int k = 0; k < n; ++k) {

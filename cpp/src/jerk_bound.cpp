@@ -65,7 +65,7 @@ class Upper {
 
   // The next sample of the fastest way to the steady velocity v, with the best slope that the jerk limit allows.
   double settling(double v) const noexcept {
-    const double j = s_.jerk, cap = s_.acceleration;
+    const double j = s_.jerk, cap = s_.settling;
     const double excess = s_.v - v, slope = std::copysign(std::sqrt(2.0 * j * std::abs(excess)), -excess);
     const double steepest = std::max(-cap, s_.change - 0.5 * j), flattest = std::min(cap, s_.change + 0.5 * j);
     double next, next_slope;

@@ -17,6 +17,7 @@ struct JerkState {
   double room;              // to the upper position limit [velocities × cycles]
   double slack;             // of the room: a smaller excess is rounding
   double velocity, acceleration, braking, jerk, recovery;
+  double settling;  // the slope limit of a way to a steady velocity
 };
 
 struct JerkBound {

@@ -33,6 +33,14 @@ double fastest_before(double d, double a) noexcept {
   return d / (steps + 1.0) + 0.5 * a * steps;
 }
 
+// The lowest velocity after v ≥ 0 in a cycle; a = A dt, b = B dt. Across zero the smaller limit holds.
+double slowest_after(double v, double a, double b) noexcept {
+  return std::max(v - b, std::min(0.0, v - std::min(a, b)));
+}
+
+// The highest velocity after v ≥ 0 in a cycle: at zero the change is the same as that of slowest_after().
+double fastest_after(double v, double a, double b) noexcept { return v + (b >= a ? a : std::min(a, b + v)); }
+
 // The velocity from which a joint can stop within d, under |v'| ≤ a and |v''| ≤ j, from no acceleration to none: D⁻¹ of
 // LimitTracker::arrival(). In velocities and cycles.
 double speed_before(double d, double a, double j) noexcept {
@@ -85,15 +93,19 @@ LimitTracker::LimitTracker(const JointLimits& limits, double dt, const LimitOpti
   require(options.assumed_acceleration > 0.0, "assumed_acceleration = ", options.assumed_acceleration,
           " must be above 0");
   require(n_ > 0, "there are no joints");
-  const std::pair<const char*, const JointVector*> positive[] = {
-      {"velocity", &limits.velocity}, {"acceleration", &limits.acceleration}, {"jerk", &limits.jerk}};
+  const JointVector deceleration = limits.deceleration.size() != 0 ? limits.deceleration
+                                                                   : JointVector::Constant(n_, kInfinity);
+  const std::pair<const char*, const JointVector*> positive[] = {{"velocity", &limits.velocity},
+                                                                 {"acceleration", &limits.acceleration},
+                                                                 {"deceleration", &deceleration},
+                                                                 {"jerk", &limits.jerk}};
   require(limits.upper.size() == n_, "upper has ", limits.upper.size(), " entries, lower ", n_);
   for (const auto& [what, values] : positive) {
     require(values->size() == n_, what, " has ", values->size(), " entries, lower ", n_);
   }
   // Beyond n_ are numbers that are harmless in every operation, because blocks of a fixed size are read and written.
   lower_.fill(-1.0);
-  for (Numbers* x : {&upper_, &velocity_, &acceleration_, &jerk_, &recovery_}) x->fill(1.0);
+  for (Numbers* x : {&upper_, &velocity_, &acceleration_, &braking_, &jerk_, &recovery_}) x->fill(1.0);
   for (int i = 0; i < n_; ++i) {
     require(limits.lower[i] <= limits.upper[i], "joint ", i, ": lower = ", limits.lower[i],
             " is not below upper = ", limits.upper[i]);
@@ -107,9 +119,11 @@ LimitTracker::LimitTracker(const JointLimits& limits, double dt, const LimitOpti
     const double acceleration = limits.acceleration[i] < kInfinity ? limits.acceleration[i]
                                                                    : options.assumed_acceleration;
     acceleration_[at] = options.acceleration ? acceleration * dt : kInfinity;
+    braking_[at] = options.acceleration && deceleration[i] < kInfinity ? deceleration[i] * dt : acceleration_[at];
     jerk_[at] = options.jerk ? limits.jerk[i] * dt * dt : kInfinity;
     recovery_[at] = options.recovery_speed * limits.velocity[i];
     if (jerk_[at] < kInfinity) with_jerk_ |= 1u << i;
+    if (braking_[at] != acceleration_[at]) uneven_ |= 1u << i;
   }
   settling_time_ = longest_settling();
 }
@@ -125,7 +139,8 @@ void LimitTracker::reset(const JointRef& q, const JointRef& qdot, const JointRef
   for (int i = 0; i < n_; ++i) {
     const auto at = static_cast<std::size_t>(i);
     if (qddot.size() != 0) {
-      const double change = std::clamp(qddot[i] * dt_, -acceleration_[at], acceleration_[at]);
+      const double most = std::max(acceleration_[at], braking_[at]);
+      const double change = std::clamp(qddot[i] * dt_, -most, most);
       states[at].change = states[at].slope = change;
     } else if (continues(i, q[i], qdot.size() != 0 ? qdot[i] : 0.0)) {
       states[at] = jerk_states_[at];
@@ -233,7 +248,7 @@ unsigned LimitTracker::survey() noexcept {
   Eigen::Map<Block>(bounds_.lower.data()) = lower;
   Eigen::Map<Block>(bounds_.upper.data()) = upper;
   Eigen::Map<Block>(stop_.data()) = lower.max(0.0).min(upper);
-  unsigned more = with_jerk_;
+  unsigned more = with_jerk_ | uneven_;
   for (int i = 0; i < n_; ++i) {
     const auto at = static_cast<std::size_t>(i);
     if (!(spare[i] >= 0.0 && slow[i] >= 0.0)) more |= 1u << i;
@@ -273,7 +288,7 @@ double LimitTracker::recovery(int i, double outside) const noexcept {
 }
 
 double LimitTracker::towards(int i, double room) const noexcept {
-  const double a = braking(acceleration_[static_cast<std::size_t>(i)]);
+  const double a = braking(braking_[static_cast<std::size_t>(i)]);
   if (room >= 0.0) return fastest_before(room, a);
   return -std::min(fastest_before(-room, a), recovery(i, -room * dt_));
 }
@@ -288,7 +303,7 @@ VelocityBounds LimitTracker::heading() const noexcept {
       if (!(room < kInfinity)) return kInfinity;
       const double most = towards(i, room);
       if ((with_jerk_ >> i & 1u) == 0 || room < 0.0) return most;
-      return std::min(most, speed_before(room, kArrivalAcceleration * acceleration_[at], kArrivalJerk * jerk_[at]));
+      return std::min(most, speed_before(room, kArrivalAcceleration * braking_[at], kArrivalJerk * jerk_[at]));
     };
     Window window{-kInfinity, kInfinity, LimitKind::None, LimitKind::None};
     window.narrow(-speed(room_below(i)), speed(room_above(i)), LimitKind::Position);
@@ -303,7 +318,7 @@ double LimitTracker::arrival(const JointVector& qdot, double gain) const noexcep
     const auto at = static_cast<std::size_t>(i);
     const double size = std::abs(qdot[i]);
     if (!(size > 0.0)) continue;
-    const double cap = speed_before(size / gain * per_dt_, kArrivalAcceleration * acceleration_[at],
+    const double cap = speed_before(size / gain * per_dt_, kArrivalAcceleration * braking_[at],
                                     kArrivalJerk * jerk_[at]);
     if (size * part > cap) part = cap / size;
   }
@@ -317,7 +332,8 @@ JointVector LimitTracker::approach(const JointVector& wanted) const noexcept {
   for (int i = 0; i < n_; ++i) {
     const auto at = static_cast<std::size_t>(i);
     const double size = std::abs(wanted[i] - v_[i]);
-    if (most * size > acceleration_[at]) most = acceleration_[at] / size;
+    const double change = change_limit(i, wanted[i]);
+    if (most * size > change) most = change / size;
     if (more * size > jerk_[at]) more = jerk_[at] / size;
   }
   JointVector out = v_;
@@ -342,6 +358,28 @@ JointVector LimitTracker::approach(const JointVector& wanted) const noexcept {
   return out;
 }
 
+double LimitTracker::slope_limit(int i, bool upwards) const noexcept {
+  const auto at = static_cast<std::size_t>(i);
+  const double a = acceleration_[at], b = braking_[at];
+  if ((uneven_ >> i & 1u) == 0) return a;
+  const double least = std::min(a, b), speed = std::abs(v_[i]), j = jerk_[at];
+  const bool brakes = upwards ? v_[i] < 0.0 : v_[i] > 0.0;
+  if (!brakes) return std::min(a, std::sqrt(least * least + 2.0 * j * speed));
+  const double slope = std::sqrt(least * (least + j) + 0.25 * j * j + 2.0 * j * std::max(0.0, speed - least)) - 0.5 * j;
+  return std::min({b, std::max(least, slope), std::max(least, speed)});
+}
+
+// Time of braking and time of speeding up add up; the cycle at hand has the limit of what it does.
+double LimitTracker::change_limit(int i, double wanted) const noexcept {
+  const auto at = static_cast<std::size_t>(i);
+  const double v = v_[i], a = acceleration_[at], b = braking_[at];
+  if ((uneven_ >> i & 1u) == 0) return a;
+  const double from = std::abs(v), to = std::abs(wanted), size = std::abs(wanted - v);
+  double mean = to >= from ? a : b;
+  if (v * wanted < 0.0) mean = size / (from / b + to / a);
+  return (with_jerk_ >> i & 1u) != 0 ? std::min(mean, slope_limit(i, wanted > v)) : mean;
+}
+
 double LimitTracker::least_jerk() const noexcept {
   double least = kInfinity;
   for (int i = 0; i < n_; ++i) least = std::min(least, jerk_[static_cast<std::size_t>(i)] * per_dt_ * per_dt_);
@@ -350,7 +388,7 @@ double LimitTracker::least_jerk() const noexcept {
 
 double LimitTracker::least_acceleration() const noexcept {
   double least = kInfinity;
-  for (int i = 0; i < n_; ++i) least = std::min(least, acceleration_limit(i));
+  for (int i = 0; i < n_; ++i) least = std::min({least, acceleration_limit(i), deceleration_limit(i)});
   return least;
 }
 
@@ -383,7 +421,8 @@ double LimitTracker::longest_settling() const noexcept {
     const auto at = static_cast<std::size_t>(i);
     const double range = upper_[at] - lower_[at], way = range < kInfinity ? range : kTurn;
     // The time of a motion with each limit alone adds up to more than that of a motion with all limits.
-    longest = std::max(longest, way / velocity_[at] + 2.0 * std::sqrt(way / acceleration_limit(i)) +
+    longest = std::max(longest, way / velocity_[at] +
+                                    2.0 * std::sqrt(way / std::min(acceleration_limit(i), deceleration_limit(i))) +
                                     4.0 * std::cbrt(way / (jerk_[at] * per_dt_ * per_dt_)));
   }
   return 3.0 + 3.0 * longest;
@@ -391,17 +430,18 @@ double LimitTracker::longest_settling() const noexcept {
 
 LimitTracker::Window LimitTracker::window(int i, bool& broken) const noexcept {
   const auto at = static_cast<std::size_t>(i);
-  const double v = v_[i], a = acceleration_[at], limit = velocity_[at];
+  const double v = v_[i], a = acceleration_[at], b = braking_[at], limit = velocity_[at];
   const LimitKind kind = a < kInfinity ? LimitKind::Acceleration : LimitKind::None;
-  const Window motor{v - a, v + a, kind, kind};
+  const Window motor{v >= 0.0 ? slowest_after(v, a, b) : -fastest_after(-v, a, b),
+                     v > 0.0 ? fastest_after(v, a, b) : -slowest_after(-v, a, b), kind, kind};
   Window window = motor;
   window.narrow(-limit, limit, LimitKind::Velocity);
 
-  // D(v) ≤ v²/2A + v/2 + A/8: usually the limits are farther away than this bound.
+  // D(v) ≤ v²/2B + v/2 + B/8: usually the limits are farther away than this bound.
   const double above = room_above(i), below = room_below(i);
   const auto matters = [&](double fast, double room) {
     if (fast <= 0.0) return room < 0.0;
-    return a < kInfinity ? fast * (fast + a) + 0.25 * a * a > 2.0 * a * room : fast > room;
+    return b < kInfinity ? fast * (fast + b) + 0.25 * b * b > 2.0 * b * room : fast > room;
   };
   const double highest = above < kInfinity && matters(window.upper, above) ? towards(i, above) : kInfinity;
   const double lowest = below < kInfinity && matters(-window.lower, below) ? -towards(i, below) : -kInfinity;
@@ -415,14 +455,15 @@ LimitTracker::Window LimitTracker::jerk_window(int i, bool& broken) noexcept {
   const auto at = static_cast<std::size_t>(i);
   JerkMemory& s = jerk_states_[at];
   const double v = v_[i], above = room_above(i), below = room_below(i);
-  const double acceleration = acceleration_[at], brake = braking(acceleration);
+  const double brake = braking(braking_[at]), settling = std::min(acceleration_[at], braking_[at]);
   detail::JerkStop(v, s.slope, jerk_[at], brake).sample(1.0, s.next, s.next_slope);
   const double slack = kLimitTolerance * (1.0 + std::abs(q_[i])) * per_dt_;
   const double back = recovery(i, std::max({0.0, -above, -below}) * dt_);
-  const detail::JerkBound up = detail::upper_bound(
-      {v, s.change, s.next, s.next_slope, above, slack, velocity_[at], acceleration, brake, jerk_[at], back});
-  const detail::JerkBound down = detail::upper_bound(
-      {-v, -s.change, -s.next, -s.next_slope, below, slack, velocity_[at], acceleration, brake, jerk_[at], back});
+  const detail::JerkBound up = detail::upper_bound({v, s.change, s.next, s.next_slope, above, slack, velocity_[at],
+                                                    slope_limit(i, true), brake, jerk_[at], back, settling});
+  const detail::JerkBound down = detail::upper_bound({-v, -s.change, -s.next, -s.next_slope, below, slack,
+                                                      velocity_[at], slope_limit(i, false), brake, jerk_[at], back,
+                                                      settling});
   // The way back from one limit does not break another.
   Window window{std::min(-down.bound, up.safe), std::max(up.bound, -down.safe), down.kind, up.kind};
   if (window.lower > window.upper) {

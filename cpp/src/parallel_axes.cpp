@@ -41,7 +41,7 @@ TwoAngles cone_and_plane(const Vector3d& h, const Vector3d& k, const Vector3d& p
 }  // namespace
 
 std::optional<ParallelAxes> ParallelAxes::of(const Chain& chain) {
-  if (chain.dof() != 6) return std::nullopt;
+  if (chain.dof() != 6 || chain.has_mimics()) return std::nullopt;
   ParallelAxes arm;
   Pose frame = Pose::Identity();
   double size = 0.0;

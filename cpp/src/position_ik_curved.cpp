@@ -14,11 +14,12 @@ namespace {
 // ½ of the second derivative of E, in units of `scale` of each joint. With the twist s_k of joint k at the tip, and E's
 // derivatives −f and K with respect to the tip's twist,
 //     ½ ∂²E/∂q_k∂q_l = s_kᵀ K s_l − fᵀ ½ (∂s_k/∂q_l + ∂s_l/∂q_k)
-JointMatrix curvature(const Jacobian& jacobian, const JointVector& scale, const Row6& force,
+JointMatrix curvature(const Chain& chain, const DescentPoint& point, const JointVector& scale, const Row6& force,
                       const Matrix6& stiffness) noexcept {
+  const Jacobian& jacobian = point.state.jacobian;
   const Eigen::Index n = jacobian.cols();
   JacobianGradient gradient;
-  jacobian_gradient(jacobian, gradient);
+  jacobian_gradient(chain, point.q, jacobian, gradient);
   const Eigen::Vector3d linear = force.head<3>(), angular = 0.5 * force.tail<3>();
   JointMatrix h(n, n);
   for (Eigen::Index k = 0; k < n; ++k) {
@@ -68,7 +69,7 @@ JointVector Descent::curved_step(const DescentPoint& point, double damping, doub
   const JointVector scale = problem_.reach.cwiseSqrt();
   const Pose& tip = point.state.tip;
   const Row6 force = problem_.rows.force(tip, target_, shift_);
-  const JointMatrix h = curvature(point.state.jacobian, scale, force, problem_.rows.stiffness(tip, target_, shift_));
+  const JointMatrix h = curvature(problem_.chain, point, scale, force, problem_.rows.stiffness(tip, target_, shift_));
   const JointVector slope = scale.cwiseProduct(point.state.jacobian.transpose() * force);
   double lambda = damping + 1e-13 * std::max(h.diagonal().cwiseAbs().sum(), 1e-280);
 

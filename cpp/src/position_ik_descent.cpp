@@ -1,4 +1,5 @@
 #include "position_ik_descent.hpp"
+#include "mimic.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -57,6 +58,7 @@ DescentProblem::DescentProblem(const Chain& arm, const PositionIkOptions& option
       reach[i] = length * length;
       continue;
     }
+    if (!repeats(arm, i)) continue;
     const bool endless = std::isinf(lower[i]) && std::isinf(upper[i]);
     if (endless || (turns && upper[i] - lower[i] >= kTurn)) {
       turning |= 1u << i;
@@ -70,7 +72,7 @@ bool DescentProblem::place(const JointRef& near, JointVector& q, double rounding
   const JointLimits& limits = chain.limits();
   bool inside = true;
   for (int i = 0; i < q.size(); ++i) {
-    if (chain.joint_types()[static_cast<std::size_t>(i)] != JointType::Prismatic) {
+    if (repeats(chain, static_cast<int>(i))) {
       double turns = std::round((near[i] - q[i]) / kTurn);
       turns += std::max(0.0, std::ceil((limits.lower[i] - rounding - q[i]) / kTurn - turns));
       turns -= std::max(0.0, std::ceil((q[i] - limits.upper[i] - rounding) / kTurn + turns));

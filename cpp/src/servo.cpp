@@ -97,6 +97,8 @@ Servo::Servo(Chain chain, const Method& method, const ServoOptions& options)
     require(!options.exact[i] || options.task.mask[i], "exact asks for row ", i, ", which the task's mask leaves out");
     rest_.mask[i] = options.task.mask[i] && !options.exact[i];
   }
+  if (options.joint_weights.size() != 0) check_joints("joint_weights", options.joint_weights, chain_);
+  solver_.set_joint_weights(options.joint_weights);
   solver_.set_pace(pace_of(tracker_, solver_.length_scale()));
   following_error_ = expected_error_ = JointVector::Zero(chain_.dof());
   expect_motion();
@@ -123,7 +125,7 @@ void Servo::begin(const JointRef& posture) noexcept {
   least_squares_.reset();
   slowing_.reset();
   exact_spectrum_ = rest_spectrum_ = Spectrum{};
-  sigmaik::update(chain_, tracker_.q(), state_);
+  locate();
   fade_ = 0.0;
   expect_motion();
   forget_guide();
@@ -149,6 +151,7 @@ bool Servo::measure(const JointRef& q, const JointRef& qdot) noexcept {
     expect_motion();
   }
   measured_tip_ = pose(chain_, tracker_.q() + following_error_);
+  if (with_tool_) measured_tip_ = measured_tip_ * tool_;
   return true;
 }
 
@@ -156,7 +159,40 @@ void Servo::continue_from(const Servo& other) {
   tracker_.continue_from(other.tracker_);
   if (other.tracker_.q().size() == 0) return;
   qdot_start_ = other.tracker_.qdot();
+  if (!with_tool_ && other.with_tool_) {
+    tool_ = other.tool_;
+    with_tool_ = true;
+    if (guide_) guide_->set_tool(tool_);
+  }
   begin(other.nominal_);
+}
+
+void Servo::locate() noexcept {
+  sigmaik::update(chain_, tracker_.q(), state_);
+  if (!with_tool_) return;
+  const Eigen::Vector3d lever = state_.tip.linear() * tool_.translation();
+  state_.tip = state_.tip * tool_;
+  for (int i = 0; i < chain_.dof(); ++i) {
+    const Eigen::Vector3d omega = state_.jacobian.col(i).tail<3>();
+    state_.jacobian.col(i).head<3>() += omega.cross(lever);
+  }
+}
+
+bool Servo::set_tool(const Pose& tool) noexcept {
+  if (!is_pose(tool.matrix())) return false;
+  const Pose next = nearest_pose(tool);
+  if (next.matrix() == tool_.matrix()) return true;
+  tool_ = next;
+  with_tool_ = next.matrix() != Pose::Identity().matrix();
+  if (guide_) guide_->set_tool(tool_);
+  if (tracker_.q().size() == 0) return true;
+  locate();
+  if (measured_) measured_tip_ = pose(chain_, tracker_.q() + following_error_) * tool_;
+  qdot_start_ = tracker_.qdot();
+  fade_ = 0.0;
+  expect_motion();
+  forget_guide();
+  return true;
 }
 
 void Servo::set_method(const Method& method) {
@@ -320,7 +356,7 @@ void Servo::take(ServoStep& step, bool achieved) noexcept {
     step.achieved_twist.setZero();
     for (int i = 0; i < chain_.dof(); ++i) step.achieved_twist += step.qdot[i] * state_.jacobian.col(i);
   }
-  sigmaik::update(chain_, step.q, state_);
+  locate();
 }
 
 }  // namespace sigmaik

@@ -86,6 +86,7 @@ void Servo::slow_down(ServoStep& step) noexcept {
   step.qdot = has_exact() ? mixed(first, second) : second;
 }
 
+// Joints with weights have x_j = √w_j (q̇_j − q̇_rule,j).
 // In x = q̇ − q̇_rule and t = (1 − s)/k: min |x|² + |t|² + |z|² where the rows' parts of x + k t q̇_rule are zero. In the
 // coordinates of the singular vectors the rows are v_iᵀ, so that a singular direction of J weighs as much as another.
 // With exact rows there are two groups of rows, and the second group consists of the other rows' part that leaves the
@@ -116,16 +117,18 @@ bool Servo::slow_down_by_rows(const JointVector& asked, bool by_priority, JointV
     problem_.C(first + i, n + groups + i) = 1.0 - regular;
   }
   for (int i = 0; i < n; ++i) {
-    const double limit = tracker_.velocity_limit(i);
-    problem_.lower[i] = (-limit - asked[i]) / largest;
-    problem_.upper[i] = (limit - asked[i]) / largest;
+    const double limit = tracker_.velocity_limit(i), heavy = heaviness(i);
+    problem_.lower[i] = heavy * (-limit - asked[i]) / largest;
+    problem_.upper[i] = heavy * (limit - asked[i]) / largest;
+    if (heavy != 1.0) problem_.C.col(i) /= heavy;
   }
   problem_.lower.segment(n, groups).setZero();
   problem_.upper[n] = 1.0 / kSlower;
   if (groups > 1) problem_.upper[n + 1] = 1.0 / kSlowerRest;
   const LeastSquaresSolution solution = slowing_.solve(problem_);
   if (solution.status != LeastSquaresStatus::Optimal) return false;
-  qdot = asked + largest * solution.x.head(n);
+  qdot = asked;
+  for (int i = 0; i < n; ++i) qdot[i] += largest * solution.x[i] / heaviness(i);
   step.limiting_joints |= static_cast<std::uint16_t>((solution.at_lower | solution.at_upper) & ((1u << n) - 1u));
   for (int i = 0; i < n; ++i) {
     const double limit = tracker_.velocity_limit(i);

@@ -61,6 +61,7 @@ bool ServoLoop::take_over() noexcept {
   Driver* const next = incoming_.exchange(nullptr, std::memory_order_acq_rel);
   if (next == nullptr) return false;
   if (!next->restart) next->servo.continue_from(driver_->servo);
+  if (next->restart) tools_taken_ = 0;  // the loop's tool comes back with the cycle
   Driver* const old = std::exchange(driver_, next);
   old->next = done_.load(std::memory_order_relaxed);
   // Other threads only take the whole list, so the exchange fails at most once for each time they do.
@@ -96,6 +97,10 @@ LoopSample ServoLoop::cycle(bool halted, bool ending) noexcept {
   Servo& servo = driver_->servo;
   commands_.fetch();
   const Command& command = commands_.newest();
+  if (command.tools != tools_taken_) {
+    servo.set_tool(command.tool);
+    tools_taken_ = command.tools;
+  }
   sample.configuration = driver_->number;
   sample.time = 1e-9 * static_cast<double>(since_start());
   sample.cycle = cycles_.load(std::memory_order_relaxed);

@@ -103,7 +103,7 @@ void ServoLoop::start() {
   const auto kind = static_cast<LoopFaultKind>(fault_.load(std::memory_order_acquire));
   if (kind != LoopFaultKind{})
     throw Error("a fault stopped the arm (" + described(kind).text + "): call acknowledge()");
-  commands_.post({});
+  post({});
   measurements_.fetch();  // what was measured before
   ending_ = following_ = false;
   cycles_ = missed_ = unread_ = sink_errors_ = rough_targets_ = worst_delay_ = ended_ = 0;
@@ -221,7 +221,7 @@ void ServoLoop::release(LoopToken token) {
     require((latch & 1u) == 0 || rested_.load(std::memory_order_acquire) == latch, "the arm does not rest yet");
   }
   if ((latch & 1u) == 0) return;
-  commands_.post({});
+  post({});
   require(latch_.compare_exchange_strong(latch, latch + 1, std::memory_order_acq_rel), "the arm was halted just now");
 }
 
@@ -292,7 +292,28 @@ void ServoLoop::command(const Command& command, LoopToken token) {
   const std::lock_guard lock(callers_);
   refuse_stranger(token);
   refuse_motion();
-  commands_.post(command);
+  post(command);
+}
+
+// With callers_ locked.
+void ServoLoop::post(const Command& command) noexcept {
+  const Pose tool = posted_.tool;
+  const unsigned tools = posted_.tools;
+  posted_ = command;
+  posted_.tool = tool;
+  posted_.tools = tools;
+  commands_.post(posted_);
+}
+
+// A tool comes with the command: no cycle follows the next command with the last tool.
+void ServoLoop::set_tool(const Pose& tool, LoopToken token) {
+  require(is_pose(tool.matrix()), "the tool's pose is not a pose");
+  refuse_fork();
+  const std::lock_guard lock(callers_);
+  refuse_stranger(token);
+  posted_.tool = nearest_pose(tool);
+  ++posted_.tools;
+  commands_.post(posted_);
 }
 
 void ServoLoop::follow(const Pose& target, double timeout, LoopToken token) {
@@ -309,7 +330,7 @@ void ServoLoop::follow_twist(const Twist& twist, double timeout, LoopToken token
 void ServoLoop::hold() noexcept {
   if (forked()) return;
   const std::lock_guard lock(callers_);
-  commands_.post({});
+  post({});
 }
 
 LoopToken ServoLoop::take(const std::string& name, bool take_over) {
@@ -322,7 +343,7 @@ LoopToken ServoLoop::take(const std::string& name, bool take_over) {
   }
   owner_name_ = name;
   owner_ = {++tokens};
-  commands_.post({});
+  post({});
   return owner_;
 }
 
@@ -332,7 +353,7 @@ bool ServoLoop::give_back(LoopToken token) noexcept {
   if (token == LoopToken{} || token != owner_) return false;
   owner_ = {};
   owner_name_.clear();
-  commands_.post({});
+  post({});
   return true;
 }
 

@@ -10,6 +10,7 @@
 #include <sigmaik/servo.hpp>
 
 #include "angular_rows.hpp"
+#include "joint_weights.hpp"
 
 namespace sigmaik {
 namespace {
@@ -89,6 +90,12 @@ void Servo::prioritize(const Twist& twist, const JointVector& posture, Solution&
     if (posture.size() != 0) free = rest_of(free, rest_spectrum_, rest_resolution_);
   }
   if (posture.size() != 0) qdot += free;
+  if (weighs_joints()) {
+    detail::WeightedDirections directions;
+    directions.add(exact_spectrum_, exact_resolution_);
+    if (rest_.rows() != 0) directions.add(rest_spectrum_, rest_resolution_);
+    qdot = directions.prefer(qdot, posture, solver_.lightness());
+  }
   solution.qdot = mixed(qdot, solution.qdot);
   solution.achieved_twist = state_.jacobian.lazyProduct(solution.qdot);
   if (!exact) solution.status = Status::Damped;

@@ -80,6 +80,13 @@ JointVector Servo::nearest(const JointVector& begin, const TaskJacobian& rows, c
   const double least = kJointWeight * kJointWeight * largest * largest;
   problem_.C.setZero(m, n + m);
   problem_.C.leftCols(n) = rows;
+  JointVector heavy = JointVector::Ones(n);  // x_j = √w_j (q̇_j − begin_j)
+  if (weighs_joints()) {
+    for (int i = 0; i < n; ++i) {
+      heavy[i] = heaviness(i);
+      problem_.C.col(i) /= heavy[i];
+    }
+  }
   problem_.lower.setConstant(n + m, -std::numeric_limits<double>::infinity());
   problem_.upper.setConstant(n + m, std::numeric_limits<double>::infinity());
   std::uint32_t held = 0;
@@ -87,15 +94,16 @@ JointVector Servo::nearest(const JointVector& begin, const TaskJacobian& rows, c
   double weight = least;
   for (int pass = 0; pass < 2; ++pass) {
     problem_.C.rightCols(m).diagonal().setConstant(std::sqrt(weight));
-    problem_.lower.head(n) = bounds.lower - qdot;
-    problem_.upper.head(n) = bounds.upper - qdot;
+    problem_.lower.head(n) = heavy.cwiseProduct(bounds.lower - qdot);
+    problem_.upper.head(n) = heavy.cwiseProduct(bounds.upper - qdot);
     problem_.d = goal - rows.lazyProduct(qdot);
     const LeastSquaresSolution solution = least_squares_.solve(problem_);
     if (solution.status == LeastSquaresStatus::BadInput) {  // numbers too far apart
       return begin.cwiseMax(bounds.lower).cwiseMin(bounds.upper);
     }
     // Clamp exactly: one ulp outside, and the next cycle's bounds could be empty.
-    const JointVector answer = (qdot + solution.x.head(n)).cwiseMax(bounds.lower).cwiseMin(bounds.upper);
+    const JointVector answer =
+        (qdot + solution.x.head(n).cwiseQuotient(heavy)).cwiseMax(bounds.lower).cwiseMin(bounds.upper);
     held |= solution.at_lower | solution.at_upper;
     if (pass == 1) {
       qdot = answer;

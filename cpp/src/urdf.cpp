@@ -4,7 +4,10 @@
 // are therefore no reason to refuse a file. No text of the file reaches urdfdom's log, which uses some texts as printf
 // formats and crashes on "%s".
 
+#include <algorithm>
 #include <cmath>
+#include <map>
+#include <set>
 #include <utility>
 
 #include <sigmaik/chain.hpp>
@@ -16,10 +19,13 @@
 namespace sigmaik {
 namespace {
 
+namespace xml = detail::xml;
+
 using detail::require;
 using detail::xml::fail;
 using detail::xml::listed;
 using detail::xml::number;
+using detail::xml::numbers;
 using detail::xml::only_child;
 using detail::xml::origin;
 using detail::xml::parse;
@@ -51,23 +57,25 @@ double none_if_huge(double limit) { return std::abs(limit) >= 1e9 ? std::copysig
 // Exporters write 0 for a limit that they do not know. A joint that must not move would be a fixed joint.
 double none_if_zero(double limit) { return limit == 0.0 ? kInfinity : none_if_huge(limit); }
 
-void read_limits(const TreeJoint& from, const urdf::Joint& joint, Segment& segment) {
+void read_limits(const TreeJoint& from, Segment& segment) {
   const XMLElement* const limit = from.element->FirstChildElement("limit");
   if (limit == nullptr) return;  // a continuous joint: urdfdom requires <limit> of all other types
-  segment.velocity = none_if_zero(joint.limits->velocity);
+  const auto read = [&](const char* attribute) {
+    return xml::limit(from.label(), *limit, attribute).value_or(kInfinity);
+  };
+  segment.velocity = none_if_zero(read("velocity"));
   // URDF requires an effort, so files write 0 for an unknown effort; a velocity of 0 may be intended and gets a note.
-  if (joint.limits->velocity == 0.0 && limit->Attribute("velocity") != nullptr) {
+  if (read("velocity") == 0.0) {
     segment.notes.push_back(from.label() +
                             ": velocity = 0 counts as no limit; a joint that does not move is of type fixed");
   }
-  segment.effort = none_if_zero(joint.limits->effort);
-  if (limit->Attribute("acceleration") != nullptr) {
-    segment.acceleration = none_if_huge(number(from.label(), *limit, "acceleration"));
-  }
-  if (limit->Attribute("jerk") != nullptr) segment.jerk = none_if_huge(number(from.label(), *limit, "jerk"));
+  segment.effort = none_if_zero(read("effort"));
+  segment.acceleration = none_if_huge(read("acceleration"));
+  segment.deceleration = none_if_huge(read("deceleration"));
+  segment.jerk = none_if_huge(read("jerk"));
   if (segment.type == JointType::Continuous) return;
-  segment.lower = none_if_huge(joint.limits->lower);
-  segment.upper = none_if_huge(joint.limits->upper);
+  segment.lower = none_if_huge(xml::limit(from.label(), *limit, "lower").value_or(0.0));
+  segment.upper = none_if_huge(xml::limit(from.label(), *limit, "upper").value_or(0.0));
   // Both bounds default to 0 in URDF, and the joint could not move.
   require(limit->Attribute("lower") != nullptr || limit->Attribute("upper") != nullptr, from.label(),
           ": <limit> gives neither lower nor upper; a joint that turns without end is of type continuous");
@@ -90,20 +98,68 @@ Segment read_segment(const TreeJoint& from, const urdf::Joint& joint, const Tree
       fail(from.label(), " is of type ", from.element->Attribute("type"),
            "; an arm has revolute, continuous, prismatic and fixed joints");
   }
-  if (const XMLElement* const mimic = from.element->FirstChildElement("mimic")) {
-    const char* const other = mimic->Attribute("joint");
-    fail(from.label(), " mimics joint '", other != nullptr ? other : "",
-         "'; only joints that move by themselves can be part of an arm");
-  }
   segment.axis = Eigen::Vector3d(joint.axis.x, joint.axis.y, joint.axis.z);
-  read_limits(from, joint, segment);
+  read_limits(from, segment);
   return segment;
+}
+
+bool is_fixed(const TreeJoint& joint) { return joint.element->Attribute("type", "fixed") != nullptr; }
+
+// What <mimic> says, followed to a joint that moves by itself.
+Mimic mimic_of(const TreeJoint& from, const Tree& tree) {
+  Mimic whole{from.name, 1.0, 0.0};
+  const TreeJoint* at = &from;
+  std::set<std::string> seen;
+  while (const XMLElement* const mimic = is_fixed(*at) ? nullptr : only_child(at->label(), *at->element, "mimic")) {
+    require(seen.insert(at->name).second, from.label(), " mimics itself in the end");
+    const char* const name = mimic->Attribute("joint");
+    if (name == nullptr) fail(at->label(), ": <mimic> has no joint");
+    const std::vector<double> multiplier = numbers(at->label(), *mimic, "multiplier", 1);
+    const std::vector<double> offset = numbers(at->label(), *mimic, "offset", 1);
+    whole.offset += whole.multiplier * (offset.empty() ? 0.0 : offset[0]);
+    whole.multiplier *= multiplier.empty() ? 1.0 : multiplier[0];
+    require(std::abs(whole.multiplier) > 1e-9, from.label(),
+            ": multiplier = 0 of its <mimic>; a joint that does not move is of type fixed");
+    const TreeJoint* const next = tree.joint(name);
+    if (next == nullptr) fail(at->label(), " mimics joint '", name, "', which is not in the file");
+    if (is_fixed(*next)) fail(at->label(), " mimics joint '", name, "', which is of type fixed");
+    at = next;
+    whole.joint = at->name;
+  }
+  return whole;
+}
+
+// Joints that mimic one another by a joint beside the arm: the first of them moves by itself, and the others mimic the
+// first. With θ = m q + b of the joint q beside the arm, q = (θ_1 − b_1)/m_1.
+void read_mimics(const std::vector<const TreeJoint*>& path, const Tree& tree, std::vector<Segment>& segments) {
+  std::map<std::string, Mimic> first;  // by the joint beside the arm: the joint that moves for it
+  for (std::size_t i = 0; i < path.size(); ++i) {
+    Segment& segment = segments[i];
+    if (segment.type == JointType::Fixed) continue;
+    Mimic mimic = mimic_of(*path[i], tree);
+    if (mimic.joint == segment.joint_name) continue;
+    const bool on_path = std::any_of(path.begin(), path.end(),
+                                     [&mimic](const TreeJoint* joint) { return joint->name == mimic.joint; });
+    if (!on_path) {
+      const auto [leader, is_first] = first.try_emplace(mimic.joint, segment.joint_name, mimic.multiplier,
+                                                        mimic.offset);
+      if (is_first) {
+        segment.notes.push_back(path[i]->label() + " mimics joint '" + mimic.joint +
+                                "', which is not between base and tip: it counts as a joint that moves by itself");
+        continue;
+      }
+      const Mimic& of = leader->second;
+      const double m = mimic.multiplier / of.multiplier;
+      mimic = {of.joint, m, mimic.offset - m * of.offset};
+    }
+    segment.mimic = mimic;
+  }
 }
 
 void set_acceleration(const std::vector<double>& acceleration, std::vector<Segment>& segments) {
   std::vector<std::string> names;
   for (Segment& segment : segments) {
-    if (segment.type == JointType::Fixed) continue;
+    if (segment.type == JointType::Fixed || segment.mimic) continue;
     if (names.size() < acceleration.size()) segment.acceleration = acceleration[names.size()];
     names.push_back(segment.joint_name);
   }
@@ -128,6 +184,7 @@ Chain read_chain(const std::string& xml, std::string base, std::string tip, cons
     if (!known) fail(joint->label(), ": urdfdom reads its name as another");
     segments.push_back(read_segment(*joint, *known, tree));
   }
+  read_mimics(path, tree, segments);
   if (!acceleration.empty()) set_acceleration(acceleration, segments);
   return Chain(std::move(base), std::move(segments));
 }

@@ -63,11 +63,16 @@ std::vector<detail::LinkShape> shapes_of(const Chain& chain, const std::string& 
   tinyxml2::XMLDocument document;
   const Tree tree(parse(xml, document));
   tree.require_link("base", chain.base());
-  tree.require_link("tip", chain.tip());
+  // Tools (Chain::with_tool) are not in the file, and have no shapes.
+  std::size_t count = chain.segments().size();
+  const auto is_tool = [&tree](const Segment& s) { return s.type == JointType::Fixed && !tree.has_link(s.link_name); };
+  while (count > 1 && is_tool(chain.segments()[count - 1])) --count;
+  const std::string& tip = chain.segments()[count - 1].link_name;
+  tree.require_link("tip", tip);
   std::vector<std::string> links{chain.base()};
-  for (const TreeJoint* joint : tree.path(chain.base(), chain.tip())) links.push_back(joint->child);
+  for (const TreeJoint* joint : tree.path(chain.base(), tip)) links.push_back(joint->child);
   std::vector<std::string> expected{chain.base()};
-  for (const Segment& segment : chain.segments()) expected.push_back(segment.link_name);
+  for (std::size_t i = 0; i < count; ++i) expected.push_back(chain.segments()[i].link_name);
   if (links != expected) fail("not the arm's: its links are ", listed(links), ", the arm's ", listed(expected));
 
   std::vector<detail::LinkShape> shapes;

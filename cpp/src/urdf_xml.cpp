@@ -9,6 +9,10 @@
 #include <fstream>
 #include <set>
 
+#include <Eigen/Geometry>
+
+#include "numbers.hpp"
+
 namespace sigmaik::detail::xml {
 namespace {
 
@@ -175,6 +179,13 @@ std::vector<const TreeJoint*> Tree::path(const std::string& base, const std::str
   return joints;
 }
 
+const TreeJoint* Tree::joint(const std::string& name) const {
+  for (const auto& [link, joint] : carrier_) {
+    if (joint.name == name) return &joint;
+  }
+  return nullptr;
+}
+
 std::vector<const TreeJoint*> Tree::joints_on(const std::string& link) const {
   std::vector<const TreeJoint*> joints;
   const auto children = children_.find(link);
@@ -251,8 +262,11 @@ std::vector<double> numbers(const std::string& owner, const XMLElement& element,
     p = next;
   }
   if (!ok || values.size() != count) {
-    fail(owner, ": <", element.Name(), " ", attribute, "=\"", shortened(text),
-         "\">: ", count == 1 ? "one finite number is" : "three finite numbers are", " needed",
+    fail(owner, ": <", element.Name(), " ", attribute, "=\"", shortened(text), "\">: ",
+         count == 1   ? "one finite number is"
+         : count == 3 ? "three finite numbers are"
+                      : "four finite numbers are",
+         " needed",
          std::strchr(text, '$') != nullptr ? "; an expression of xacro's? run the file through xacro first" : "");
   }
   return values;
@@ -264,6 +278,20 @@ double number(const std::string& owner, const XMLElement& element, const char* a
   return values.front();
 }
 
+std::optional<double> limit(const std::string& owner, const XMLElement& element, const char* attribute) {
+  const char* const text = element.Attribute(attribute);
+  if (text == nullptr) return std::nullopt;
+  std::string_view word = text;
+  while (!word.empty() && is_blank(word.front())) word.remove_prefix(1);
+  while (!word.empty() && is_blank(word.back())) word.remove_suffix(1);
+  const bool negative = word.starts_with('-');
+  if (negative || word.starts_with('+')) word.remove_prefix(1);
+  std::string lower(word);
+  for (char& c : lower) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  if (lower == "inf" || lower == "infinity") return negative ? -kInfinity : kInfinity;
+  return number(owner, element, attribute);
+}
+
 Eigen::Vector3d vector(const std::string& owner, const XMLElement& element, const char* attribute) {
   const std::vector<double> values = numbers(owner, element, attribute, 3);
   return values.empty() ? Eigen::Vector3d(Eigen::Vector3d::Zero()) : Eigen::Vector3d(values[0], values[1], values[2]);
@@ -273,13 +301,21 @@ Pose origin(const std::string& owner, const XMLElement& parent) {
   Pose pose = Pose::Identity();
   const XMLElement* const e = only_child(owner, parent, "origin");
   if (e == nullptr) return pose;
-  require(e->Attribute("quat_xyzw") == nullptr, owner, ": <origin quat_xyzw=…> is not URDF 1.0; give rpy");
+  pose.translation() = vector(owner, *e, "xyz");
+  if (const std::vector<double> q = numbers(owner, *e, "quat_xyzw", 4); !q.empty()) {  // URDF 1.1
+    require(e->Attribute("rpy") == nullptr, owner, ": <origin> gives both rpy and quat_xyzw");
+    const Eigen::Quaterniond quaternion(q[3], q[0], q[1], q[2]);
+    constexpr double kRounding = 0.01;
+    require(std::abs(quaternion.norm() - 1.0) <= kRounding, owner, ": <origin quat_xyzw=\"",
+            shortened(e->Attribute("quat_xyzw")), "\"> has the length ", quaternion.norm(), ", not 1: no rotation");
+    pose.linear() = quaternion.normalized().toRotationMatrix();
+    return pose;
+  }
   const Eigen::Vector3d rpy = vector(owner, *e, "rpy");
   const Eigen::Array3d c = rpy.array().cos(), s = rpy.array().sin();
   // Rz(yaw) Ry(pitch) Rx(roll)
   pose.linear() << c[2] * c[1], c[2] * s[1] * s[0] - s[2] * c[0], c[2] * s[1] * c[0] + s[2] * s[0], s[2] * c[1],
       s[2] * s[1] * s[0] + c[2] * c[0], s[2] * s[1] * c[0] - c[2] * s[0], -s[1], c[1] * s[0], c[1] * c[0];
-  pose.translation() = vector(owner, *e, "xyz");
   return pose;
 }
 

@@ -3,6 +3,7 @@
 // Error with the facts. Numbers keep all their digits, whatever the locale.
 
 #include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -76,6 +77,12 @@ class Tree {
   // The joints from base to tip.
   std::vector<const TreeJoint*> path(const std::string& base, const std::string& tip) const;
 
+  // Whether the file has this link.
+  bool has_link(const std::string& name) const { return links_.count(name) != 0; }
+
+  // The joint with this name, or null.
+  const TreeJoint* joint(const std::string& name) const;
+
   // The joints whose parent is a link.
   std::vector<const TreeJoint*> joints_on(const std::string& link) const;
 
@@ -101,6 +108,9 @@ std::vector<double> numbers(const std::string& owner, const XMLElement& element,
 
 // One number. A missing attribute is an error.
 double number(const std::string& owner, const XMLElement& element, const char* attribute);
+
+// A limit: one number, which may be infinite ("inf", "-inf"; URDF 1.2). None if the attribute is missing.
+std::optional<double> limit(const std::string& owner, const XMLElement& element, const char* attribute);
 
 // Three numbers, zero if the attribute is missing.
 Eigen::Vector3d vector(const std::string& owner, const XMLElement& element, const char* attribute);

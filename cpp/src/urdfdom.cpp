@@ -2,7 +2,10 @@
 
 #include <array>
 #include <charconv>
+#include <cmath>
 #include <mutex>
+#include <optional>
+#include <string_view>
 #include <thread>
 
 #include <console_bridge/console.h>
@@ -89,7 +92,10 @@ std::string reduced(const XMLElement& robot, const std::vector<const TreeJoint*>
   XMLElement* const root = document.NewElement("robot");
   document.InsertEndChild(root);
   copy(robot, "name", *root);
-  copy(robot, "version", *root);
+  // urdfdom of today's distributions knows version 1.0 alone. What 1.1 and 1.2 add is read without urdfdom.
+  const char* const version = robot.Attribute("version");
+  const bool newer = version != nullptr && (std::string_view(version) == "1.1" || std::string_view(version) == "1.2");
+  if (!newer) copy(robot, "version", *root);
   root->InsertNewChildElement("link")->SetAttribute("name", path.front()->parent.c_str());
   for (const TreeJoint* joint : path) {
     root->InsertNewChildElement("link")->SetAttribute("name", joint->child.c_str());
@@ -105,7 +111,12 @@ std::string reduced(const XMLElement& robot, const std::vector<const TreeJoint*>
     if (auto* limit = only_child(joint->label(), *joint->element, "limit")) {
       XMLElement* const to = e->InsertNewChildElement("limit");
       for (const char* attribute : {"lower", "upper", "velocity", "effort"}) {
-        copy_numbers(joint->label(), *limit, attribute, 1, *to);
+        const std::optional<double> value = xml::limit(joint->label(), *limit, attribute);
+        if (value && std::isfinite(*value)) {
+          copy_numbers(joint->label(), *limit, attribute, 1, *to);
+        } else if (value || newer) {  // urdfdom knows no infinity, and requires what version 1.2 leaves out
+          to->SetAttribute(attribute, "0");
+        }
       }
     }
   }

@@ -6,6 +6,7 @@
 
 #include "angular_rows.hpp"
 #include "finite.hpp"
+#include "joint_weights.hpp"
 #include "message.hpp"
 
 namespace sigmaik {
@@ -62,6 +63,20 @@ void VelocitySolver::set_pace(const Pace& pace) {
   detail::require(pace.slowness.allFinite() && (pace.slowness.array() >= 0.0).all(),
                   "an entry of pace.slowness is negative or not finite");
   pace_ = pace;
+}
+
+void VelocitySolver::set_joint_weights(const JointRef& weights) {
+  constexpr double kMost = 1e6;
+  for (Eigen::Index i = 0; i < weights.size(); ++i) {
+    detail::require(std::isfinite(weights[i]) && weights[i] > 0.0, "joint_weights[", i, "] = ", weights[i],
+                    " must be finite and above 0");
+  }
+  lightness_.resize(0);
+  if (weights.size() == 0 || (weights.array() == weights[0]).all()) return;
+  const double least = weights.minCoeff(), most = weights.maxCoeff();
+  detail::require(most <= kMost * least, "joint_weights are from ", least, " to ", most, ", more than ", kMost,
+                  " times: lock the heavy joint (Chain::lock)");
+  lightness_ = least * weights.cwiseInverse();
 }
 
 void VelocitySolver::set_method(const Method& method) {
@@ -130,6 +145,11 @@ Solution VelocitySolver::answer(const Question& question, const TaskVector& comm
     s.qdot = question.posture + spectrum_.combine_v(speed);
   } else {
     s.qdot = spectrum_.combine_v(resolution_.speed);
+  }
+  if (lightness_.size() == s.qdot.size() && lightness_.size() != 0) {
+    detail::WeightedDirections directions;
+    directions.add(spectrum_, resolution_);
+    s.qdot = directions.prefer(s.qdot, question.posture, lightness_);
   }
   s.achieved_twist = product(question.jacobian, s.qdot);
   if (!finite(s.qdot) || !finite(s.achieved_twist) || !std::isfinite(spectrum_.sigma(0))) {

@@ -31,20 +31,28 @@ struct FrameColumns {
   }
 };
 
-// Calls joint(i, frame) for every joint, from the base to the last joint; z of the frame lies along the joint's axis.
-// Returns the frame of the last joint.
+// Calls joint(i, frame) for each of moving() joints, from the base to the last joint; z of the frame lies along the
+// joint's axis. Returns the frame of the last joint.
 template <typename Visit>
 FrameColumns walk(const Chain& chain, const JointRef& q, Visit joint) noexcept {
   const JointConstants* constants = chain.constants().data();
-  const int n = chain.dof();
+  const int n = chain.moving();
+  const bool mimics = chain.has_mimics();
   FrameColumns f;
   for (int i = 0; i < n; ++i) {
     const JointConstants& c = constants[i];
     f.append(c.rotation, c.translation);
-    if (c.prismatic) {
-      f.p += q[i] * f.z;
+    double position = 0.0;
+    if (mimics) {
+      const Coupling& coupling = chain.couplings()[static_cast<std::size_t>(i)];
+      position = coupling.multiplier * q[coupling.joint] + coupling.offset;
     } else {
-      const double cosine = std::cos(q[i]), sine = std::sin(q[i]);
+      position = q[i];
+    }
+    if (c.prismatic) {
+      f.p += position * f.z;
+    } else {
+      const double cosine = std::cos(position), sine = std::sin(position);
       const Eigen::Vector4d x = f.x;
       f.x = cosine * x + sine * f.y;
       f.y = cosine * f.y - sine * x;

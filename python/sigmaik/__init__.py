@@ -11,7 +11,7 @@
 Units are m, rad, s, N·m. Twists and Jacobians are [v; ω], in base axes, at the tip's origin.
 """
 
-from . import _rules, indices, methods, planning, robots, sim, singularities
+from . import _rules, indices, methods, models, planning, robots, sim, singularities
 from ._core import (
     ActionChunks,
     ActionStatus,
@@ -117,6 +117,7 @@ __all__ = [
     "indices",
     "least_squares",
     "methods",
+    "models",
     "planning",
     "pose_error",
     "robots",

@@ -69,6 +69,11 @@ class JointLimits:
         (n,) [rad/s² or m/s²]
         """
     @property
+    def deceleration(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (n,) [rad/s² or m/s²], of a joint that becomes slower: the acceleration where none is given.
+        """
+    @property
     def effort(self) -> numpy.typing.NDArray[numpy.float64]:
         """
         (n,) [N·m or N]
@@ -149,6 +154,11 @@ class Segment:
         Name of the link.
         """
     @property
+    def mimic(self) -> tuple[str, float, float] | None:
+        """
+        (joint, multiplier, offset) of a joint that moves with another: multiplier · (its position) + offset; else None.
+        """
+    @property
     def origin(self) -> numpy.typing.NDArray[numpy.float64]:
         """
         (4, 4) the joint's frame in the parent link, at q = 0
@@ -172,11 +182,11 @@ class Chain:
 
         source: a file's path, or the XML text.
         base, tip: link names; by default the root, and the only leaf.
-        acceleration: (n,) limits [rad/s² or m/s²]; by default those of the file, whose <limit> elements may carry
-        an attribute `acceleration` (an extension), else infinite.
+        acceleration: (n,) limits [rad/s² or m/s²]; by default those of the file (URDF 1.2), else infinite.
 
         Raises Error with the facts for anything that is not a usable serial arm of 1 to 16 movable joints, and warns
-        (ModelWarning) of velocity limits of zero, which count as none, and of inertias that no rigid body has.
+        (ModelWarning) of velocity limits of zero, which count as none, of joints that mimic a joint beside the arm, which
+        move by themselves, and of inertias that no rigid body has.
         """
     def __repr__(self) -> str:
         ...
@@ -187,6 +197,13 @@ class Chain:
     def jacobian_gradient(self, q: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
         """
         ∂J/∂q_k (n, 6, n) at q (n,), k first; (B, n, 6, n) at q (B, n).
+        """
+    def lock(self, positions: collections.abc.Mapping[str, typing.SupportsFloat | typing.SupportsIndex]) -> Chain:
+        """
+        The same arm with joints that do not move any more: {name: position [rad or m]}. q has fewer entries.
+
+        Links and inertias stay. Raises Error where a name is not in joint_names, a position is outside its limits,
+        or no joint is left.
         """
     def missing_limits(self, *, velocity: bool = True, acceleration: bool = True) -> tuple[str, ...]:
         """
@@ -202,9 +219,19 @@ class Chain:
 
         seed: what numpy.random.default_rng takes, a Generator included.
         """
-    def with_limits(self, *, lower: numpy.typing.ArrayLike | None = None, upper: numpy.typing.ArrayLike | None = None, velocity: numpy.typing.ArrayLike | None = None, acceleration: numpy.typing.ArrayLike | None = None, jerk: numpy.typing.ArrayLike | None = None, effort: numpy.typing.ArrayLike | None = None) -> Chain:
+    def with_limits(self, *, lower: numpy.typing.ArrayLike | None = None, upper: numpy.typing.ArrayLike | None = None, velocity: numpy.typing.ArrayLike | None = None, acceleration: numpy.typing.ArrayLike | None = None, deceleration: numpy.typing.ArrayLike | None = None, jerk: numpy.typing.ArrayLike | None = None, effort: numpy.typing.ArrayLike | None = None) -> Chain:
         """
         The same arm with other limits: (n,) or one number each, infinite for none; None keeps what there is.
+
+        A continuous joint with a position limit (a cable) becomes a revolute joint. deceleration: of a joint that
+        becomes slower; infinite: as the acceleration.
+        """
+    def with_tool(self, pose: numpy.typing.ArrayLike, inertia: Inertia | None = None) -> Chain:
+        """
+        The same arm with a tool, whose frame is the new tip.
+
+        pose: (4, 4), the tool's frame in the tip.
+        inertia: Inertia of the tool, in the tool's frame; Dynamics uses it. None: not known.
         """
     @property
     def base(self) -> str:
@@ -615,6 +642,11 @@ class VelocitySolver:
         """
         Forgets the warm start.
         """
+    def set_joint_weights(self, weights: numpy.typing.ArrayLike | None) -> None:
+        """
+        How much each joint's motion counts: of all motions that move the tip as the rule says, the answer has the
+        least Σ w_j (q̇_j − posture_j)². weights: (n,) > 0, only ratios matter; None: all 1.
+        """
     def solve(self, J: numpy.typing.ArrayLike, twist: numpy.typing.ArrayLike, posture: numpy.typing.ArrayLike | None = None, rotation: numpy.typing.ArrayLike | None = None) -> Solution:
         """
         Joint velocities for a twist.
@@ -746,7 +778,7 @@ class Servo:
     It integrates its own command (q ← q + q̇ dt) and needs no measured positions (`measure`). Every command holds
     the chain's limits and leaves room to go on holding them; a start outside them comes back.
     """
-    def __init__(self, chain: Chain, method: Method | str | None = None, dt: typing.SupportsFloat | typing.SupportsIndex = 0.001, *, gain_linear: typing.SupportsFloat | typing.SupportsIndex = 10.0, gain_angular: typing.SupportsFloat | typing.SupportsIndex = 10.0, max_linear_error: typing.SupportsFloat | typing.SupportsIndex | None = None, max_angular_error: typing.SupportsFloat | typing.SupportsIndex = 1.0, soft_start: typing.SupportsFloat | typing.SupportsIndex = 0.1, posture: numpy.typing.ArrayLike | None = None, posture_gain: typing.SupportsFloat | typing.SupportsIndex = 0.0, posture_max_speed: typing.SupportsFloat | typing.SupportsIndex = ..., avoid: typing.Literal['manipulability', 'potential'] | None = None, avoid_gain: typing.SupportsFloat | typing.SupportsIndex = 1.0, avoid_max_speed: typing.SupportsFloat | typing.SupportsIndex = 0.5, eta1: typing.SupportsFloat | typing.SupportsIndex = 0.0, eta2: typing.SupportsFloat | typing.SupportsIndex = 10.0, position_limits: bool = True, velocity_limits: bool = True, acceleration_limits: bool = True, jerk_limits: bool = True, assumed_acceleration: typing.SupportsFloat | typing.SupportsIndex = 10.0, recovery_speed: typing.SupportsFloat | typing.SupportsIndex = 0.1, on_limit: typing.Literal['redistribute', 'scale'] = 'redistribute', exact: numpy.typing.ArrayLike | None = (0, 0, 0, 0, 0, 0), length_scale: typing.SupportsFloat | typing.SupportsIndex | None = None, guided: bool = False, mask: numpy.typing.ArrayLike | None = (1, 1, 1, 1, 1, 1), frame: typing.Literal['base', 'tool'] = 'base') -> None:
+    def __init__(self, chain: Chain, method: Method | str | None = None, dt: typing.SupportsFloat | typing.SupportsIndex = 0.001, *, gain_linear: typing.SupportsFloat | typing.SupportsIndex = 10.0, gain_angular: typing.SupportsFloat | typing.SupportsIndex = 10.0, max_linear_error: typing.SupportsFloat | typing.SupportsIndex | None = None, max_angular_error: typing.SupportsFloat | typing.SupportsIndex = 1.0, soft_start: typing.SupportsFloat | typing.SupportsIndex = 0.1, posture: numpy.typing.ArrayLike | None = None, posture_gain: typing.SupportsFloat | typing.SupportsIndex = 0.0, posture_max_speed: typing.SupportsFloat | typing.SupportsIndex = ..., avoid: typing.Literal['manipulability', 'potential'] | None = None, avoid_gain: typing.SupportsFloat | typing.SupportsIndex = 1.0, avoid_max_speed: typing.SupportsFloat | typing.SupportsIndex = 0.5, eta1: typing.SupportsFloat | typing.SupportsIndex = 0.0, eta2: typing.SupportsFloat | typing.SupportsIndex = 10.0, position_limits: bool = True, velocity_limits: bool = True, acceleration_limits: bool = True, jerk_limits: bool = True, assumed_acceleration: typing.SupportsFloat | typing.SupportsIndex = 10.0, recovery_speed: typing.SupportsFloat | typing.SupportsIndex = 0.1, on_limit: typing.Literal['redistribute', 'scale'] = 'redistribute', exact: numpy.typing.ArrayLike | None = (0, 0, 0, 0, 0, 0), length_scale: typing.SupportsFloat | typing.SupportsIndex | None = None, joint_weights: numpy.typing.ArrayLike | None = None, guided: bool = False, mask: numpy.typing.ArrayLike | None = (1, 1, 1, 1, 1, 1), frame: typing.Literal['base', 'tool'] = 'base') -> None:
         """
         Warns (ModelWarning) of velocity and acceleration limits that joints lack.
 
@@ -786,6 +818,9 @@ class Servo:
             cycle.
         length_scale: [m] > 0: 1 rad/s weighs as much as length_scale m/s, as for VelocitySolver. None:
             chain.characteristic_length.
+        joint_weights: (n,) > 0, how much each joint's motion counts where there are more joints than rows: a
+            rail with 1e4 moves only where the other joints cannot do the motion. Only ratios matter. None:
+            all 1.
         guided: whether the servo takes another way to a pose target that rests where its own way does not
             arrive: through another configuration of the arm, if need be away from the tool's straight line.
             `step.guide` says so. Arrives at each target that PositionIk finds.
@@ -824,6 +859,13 @@ class Servo:
             step keep the acceleration that the servo knows; of other joints none is assumed.
         To tell a running servo where the arm is, call `measure`.
         Warns (ModelWarning) of a joint that starts more than 1 rad or 1 m outside its limits.
+        """
+    def set_tool(self, tool: numpy.typing.ArrayLike) -> None:
+        """
+        Puts a tool on the tip from the next cycle on: targets, twists and poses are then those of its frame.
+
+        tool: (4, 4) in the chain's tip; the identity takes the tool off. q̇ does not jump: the command is faded in
+        from the last velocity over soft_start, inside all limits. For Dynamics use chain.with_tool(pose, inertia).
         """
     def update(self, target: typing.Any, feedforward: numpy.typing.ArrayLike | None = None) -> ServoStep:
         """
@@ -1044,6 +1086,11 @@ class ServoBatch:
         """
 
 # ---- Servo loop -------------------------------------------------------------------------------------------------------
+    @property
+    def tool(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (4, 4) of set_tool(), in the chain's tip.
+        """
 class LoopCommand(enum.IntEnum):
     """
     What a cycle of a ServoLoop followed.
@@ -1240,6 +1287,12 @@ class ServoLoop:
         Opens the latch of halt(), or of a fault that is acknowledged. The arm rests until a new command comes.
 
         Raises Error where the arm does not rest yet, a fault is not acknowledged, or somebody else owns the arm.
+        """
+    def set_tool(self, tool: numpy.typing.ArrayLike, token: LoopToken | None = None) -> None:
+        """
+        Puts a tool (4, 4) on the tip from the next cycle on, without a jump: see Servo.set_tool.
+
+        The live command goes on, and is then the tool's.
         """
     def start(self) -> None:
         """
@@ -2613,7 +2666,11 @@ def draw_from_prior(chain: Chain, cost: JointCost, states: typing.SupportsInt | 
     """
     q (states, n) of a motion from the prior about the straight line: a first guess of the planner with this cost.
     """
-def plan_gradient(chain: Chain, start: numpy.typing.ArrayLike, goal: numpy.typing.ArrayLike, python_costs: collections.abc.Sequence[typing.Any], cost: JointCost | None = None, spheres: ArmSpheres | None = None, field: DistanceField | None = None, *, states: typing.SupportsInt | typing.SupportsIndex = 21, prior_weight: typing.SupportsFloat | typing.SupportsIndex = 10.0, max_iterations: typing.SupportsInt | typing.SupportsIndex = 100, tolerance: typing.SupportsFloat | typing.SupportsIndex = 0.0001, restarts: typing.SupportsInt | typing.SupportsIndex = 8, duration: typing.SupportsFloat | typing.SupportsIndex | None = None) -> Trajectory:
+def nearest_turn(chain: Chain, start: numpy.typing.ArrayLike, goal: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    The goal (n,) with each continuous joint on the turn nearest to the start, at most π away.
+    """
+def plan_gradient(chain: Chain, start: numpy.typing.ArrayLike, goal: numpy.typing.ArrayLike, python_costs: collections.abc.Sequence[typing.Any], cost: JointCost | None = None, spheres: ArmSpheres | None = None, field: DistanceField | None = None, *, states: typing.SupportsInt | typing.SupportsIndex = 21, prior_weight: typing.SupportsFloat | typing.SupportsIndex = 10.0, max_iterations: typing.SupportsInt | typing.SupportsIndex = 100, tolerance: typing.SupportsFloat | typing.SupportsIndex = 0.0001, restarts: typing.SupportsInt | typing.SupportsIndex = 8, duration: typing.SupportsFloat | typing.SupportsIndex | None = None, whole_turns: bool = False) -> Trajectory:
     """
     `sigmaik.planning.gradient` is what to call.
 
@@ -2628,8 +2685,10 @@ def plan_gradient(chain: Chain, start: numpy.typing.ArrayLike, goal: numpy.typin
         answer.
     duration: [s] > 0. None: the shortest that keeps the limits of velocity and acceleration, 1 s where
         there are none.
+    whole_turns: whether goals count whole turns. False: continuous joints take the shorter way, of at most
+        half a turn.
     """
-def plan_stochastic(chain: Chain, start: numpy.typing.ArrayLike, goal: numpy.typing.ArrayLike, python_costs: collections.abc.Sequence[typing.Any], cost: JointCost | None = None, spheres: ArmSpheres | None = None, field: DistanceField | None = None, seed: typing.SupportsInt | typing.SupportsIndex | None = None, *, states: typing.SupportsInt | typing.SupportsIndex = 21, samples: typing.SupportsInt | typing.SupportsIndex = 10, max_iterations: typing.SupportsInt | typing.SupportsIndex = 30, deviation: typing.SupportsFloat | typing.SupportsIndex = 0.5, decay: typing.SupportsFloat | typing.SupportsIndex = 0.98, temperature: typing.SupportsFloat | typing.SupportsIndex = 0.1, prior_weight: typing.SupportsFloat | typing.SupportsIndex = 10.0, tolerance: typing.SupportsFloat | typing.SupportsIndex = 0.001, refine: bool = False, duration: typing.SupportsFloat | typing.SupportsIndex | None = None) -> Trajectory:
+def plan_stochastic(chain: Chain, start: numpy.typing.ArrayLike, goal: numpy.typing.ArrayLike, python_costs: collections.abc.Sequence[typing.Any], cost: JointCost | None = None, spheres: ArmSpheres | None = None, field: DistanceField | None = None, seed: typing.SupportsInt | typing.SupportsIndex | None = None, *, states: typing.SupportsInt | typing.SupportsIndex = 21, samples: typing.SupportsInt | typing.SupportsIndex = 10, max_iterations: typing.SupportsInt | typing.SupportsIndex = 30, deviation: typing.SupportsFloat | typing.SupportsIndex = 0.5, decay: typing.SupportsFloat | typing.SupportsIndex = 0.98, temperature: typing.SupportsFloat | typing.SupportsIndex = 0.1, prior_weight: typing.SupportsFloat | typing.SupportsIndex = 10.0, tolerance: typing.SupportsFloat | typing.SupportsIndex = 0.001, refine: bool = False, duration: typing.SupportsFloat | typing.SupportsIndex | None = None, whole_turns: bool = False) -> Trajectory:
     """
     `sigmaik.planning.stochastic` is what to call.
 
@@ -2645,6 +2704,8 @@ def plan_stochastic(chain: Chain, start: numpy.typing.ArrayLike, goal: numpy.typ
         objective.
     refine: whether `gradient` finishes the motion that the samples found.
     duration: [s] as for `gradient`.
+    whole_turns: whether goals count whole turns. False: continuous joints take the shorter way, of at most
+        half a turn.
     """
 def spline_velocities(q: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
     """
@@ -2695,7 +2756,7 @@ class TimeOptimal:
     Time-optimal motions of one arm with one cost, after Beck et al. (2022), by an interior-point
     method made for double integrators. `sigmaik.planning.time_optimal` is what to call.
     """
-    def __init__(self, chain: Chain, cost: JointCost | None = None, sets: SingularSets | None = None, spheres: ArmSpheres | None = None, field: DistanceField | None = None, *, nodes: typing.SupportsInt | typing.SupportsIndex = 30, time_weight: typing.SupportsFloat | typing.SupportsIndex = 1.0, effort_weight: typing.SupportsFloat | typing.SupportsIndex = 1.0, tolerance: typing.SupportsFloat | typing.SupportsIndex = 1e-09, max_iterations: typing.SupportsInt | typing.SupportsIndex = 500, between_nodes: bool = True, restarts: bool = True, clearance_width: typing.SupportsFloat | typing.SupportsIndex = 400.0) -> None:
+    def __init__(self, chain: Chain, cost: JointCost | None = None, sets: SingularSets | None = None, spheres: ArmSpheres | None = None, field: DistanceField | None = None, *, nodes: typing.SupportsInt | typing.SupportsIndex = 30, time_weight: typing.SupportsFloat | typing.SupportsIndex = 1.0, effort_weight: typing.SupportsFloat | typing.SupportsIndex = 1.0, tolerance: typing.SupportsFloat | typing.SupportsIndex = 1e-09, max_iterations: typing.SupportsInt | typing.SupportsIndex = 500, between_nodes: bool = True, restarts: bool = True, clearance_width: typing.SupportsFloat | typing.SupportsIndex = 400.0, whole_turns: bool = False) -> None:
         """
         Raises Error where an option is out of its range.
 
@@ -2710,6 +2771,8 @@ class TimeOptimal:
             through what the cost marks.
         clearance_width: [1/rad²] > 0: sets of codimension above 1 count as crossed where ψ < 1/(2
             clearance_width). Where a call has eta2, its default is eta2.
+        whole_turns: whether goals count whole turns. False: continuous joints take the shorter way, of at
+            most half a turn.
         """
     def plan(self, start: numpy.typing.ArrayLike, goal: numpy.typing.ArrayLike, start_velocity: numpy.typing.ArrayLike | None = None, goal_velocity: numpy.typing.ArrayLike | None = None) -> Trajectory:
         """

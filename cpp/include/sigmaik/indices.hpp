@@ -66,6 +66,9 @@ class IndexFunction {
   double gradient(const Jacobian& jacobian, JointVector& gradient) const noexcept;
 
  private:
+  // The index, and its slope in the entries of J: the sum of ∂index/∂σ_i u_i v_iᵀ.
+  double slope(const Jacobian& jacobian, Jacobian& slope) const noexcept;
+
   Index index_;
   double angular_, inverse_k_;
   TaskMatrix whiten_;  // Σ^{-1/2}, or empty

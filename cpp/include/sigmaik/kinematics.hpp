@@ -31,6 +31,12 @@ Pose pose(const Chain& chain, const JointRef& q) noexcept;
 /// (a prismatic joint has ω = 0). Real time.
 void jacobian_gradient(const Jacobian& jacobian, JacobianGradient& gradient) noexcept;
 
+/// The same for a chain whose joints may mimic others, where J alone does not tell: with the Jacobian J_θ of all joints
+/// that move, θ = A q + b, J = J_θ A and ∂J/∂q_k = Σ_b A_bk (∂J_θ/∂θ_b) A.
+/// \param q (n,) at which `jacobian` was taken
+void jacobian_gradient(const Chain& chain, const JointRef& q, const Jacobian& jacobian,
+                       JacobianGradient& gradient) noexcept;
+
 SIGMAIK_SAME_LAYOUT(ChainState);
 
 }  // namespace sigmaik

@@ -16,6 +16,20 @@
 /// from either side. So the intervals of position, velocity and acceleration intersect pairwise, and three intervals
 /// that intersect pairwise have a common point: there are bounds for ever.
 ///
+/// *Braking with another limit than speeding up.* A joint brakes, towards a standstill, with the deceleration limit B,
+/// and speeds up with the acceleration limit A. D above is the sum with B dt. A cycle that crosses zero keeps to the
+/// smaller limit, so that the change of velocity is within the limit of the sign before and of the sign after: from
+/// v ≥ 0 the lowest next velocity is
+///
+///     max(v − B dt, min(0, v − min(A, B) dt)),
+///
+/// and the highest v + A dt, where B < A v + min(A dt, B dt + v): so the bounds are continuous in v, and both limits
+/// hold whether the sign before or after the cycle says what braking is. v − B dt stays allowed where v ≥ B dt, else 0,
+/// so D works as before. With a jerk limit a joint that
+/// brakes changes its velocity by at most c a cycle, c² + c J dt² = m² + m J dt² + 2 J dt² (|v| − m) with the smaller
+/// limit m (and c = m where |v| ≤ m): these are the changes that can fall to m by J dt² a cycle before the joint turns
+/// round, by the sum D of changes in place of velocities. A joint that speeds up has √(m² + 2 J dt² |v|). Stops use B.
+///
 /// *With a jerk limit.* The tracker keeps a stop: the continuous velocity that starts with the present v and a slope s
 /// and comes to rest in the least time under |v'| ≤ A, |v''| ≤ J.
 ///   - Samples of this stop hold the limits: their differences are means of v' over a cycle, and these means change by
@@ -152,11 +166,15 @@ class LimitTracker {
   /// [rad/s² or m/s²], the acceleration limit of joint i that is held, the assumed one where the model has none;
   /// infinite where there is none.
   double acceleration_limit(int i) const noexcept { return acceleration_[static_cast<std::size_t>(i)] * per_dt_; }
+  /// [rad/s² or m/s²], the deceleration limit of joint i that is held, where it brakes; the acceleration limit where
+  /// the model has none.
+  double deceleration_limit(int i) const noexcept { return braking_[static_cast<std::size_t>(i)] * per_dt_; }
   /// Whether acceleration or jerk limits are held: a command then takes time.
   bool delays() const noexcept { return has_jerk() || least_acceleration() < std::numeric_limits<double>::infinity(); }
   /// Whether a joint has a jerk limit that is held.
   bool has_jerk() const noexcept { return with_jerk_ != 0; }
-  /// [rad/s² or m/s²], the least of the acceleration limits that are held; infinite where there is none.
+  /// [rad/s² or m/s²], the least of the acceleration and deceleration limits that are held; infinite where there is
+  /// none.
   double least_acceleration() const noexcept;
   /// [rad/s³ or m/s³], the least of the jerk limits that are held; infinite where there is none.
   double least_jerk() const noexcept;
@@ -224,6 +242,10 @@ class LimitTracker {
   // The velocity from which joint i, without a jerk limit, can just stop before a position limit that is `room` away;
   // the velocity that takes joint i back to the limit, where the limit is behind it.
   double towards(int i, double room) const noexcept;
+  // With a jerk limit: the largest slope of joint i at its velocity, upwards or downwards.
+  double slope_limit(int i, bool upwards) const noexcept;
+  // The largest change of velocity in a cycle for the way of joint i to the velocity `wanted`.
+  double change_limit(int i, double wanted) const noexcept;
   Window window(int i, bool& broken) const noexcept;
   Window jerk_window(int i, bool& broken) noexcept;
 
@@ -233,10 +255,12 @@ class LimitTracker {
   Numbers lower_, upper_;  // [rad or m]
   Numbers velocity_;       // V
   Numbers acceleration_;   // A dt
+  Numbers braking_;        // B dt
   Numbers jerk_;           // J dt²
   Numbers recovery_;       // [rad/s or m/s], infinite without a velocity limit
   double settling_time_ = 0.0;
   std::uint32_t with_jerk_ = 0;  // bit i: joint i has a jerk limit
+  std::uint32_t uneven_ = 0;     // bit i: joint i brakes with another limit than it speeds up
   std::array<JerkMemory, kMaxJoints> jerk_states_{};
   JointVector q_, v_, stop_;
   VelocityBounds bounds_;

@@ -3,6 +3,7 @@
 /// Pose or twist in, joint command out, each cycle: a rule on the singular directions, inside the arm's limits.
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <memory>
@@ -84,6 +85,10 @@ struct ServoOptions {
   std::array<bool, 6> exact{};
   std::optional<double> length_scale{};  ///< [m], see VelocitySolver; none: Chain::characteristic_length()
   Task task{};                           ///< which rows of the twist matter, and in which axes
+  /// (n,) > 0, how much the motion of each joint counts where the arm has more joints than the task has rows: a rail or
+  /// a base under the arm with the weight 1e4 moves only where the other joints cannot do the motion, because of a
+  /// limit or at a singularity. Only ratios matter. Empty: all 1. See VelocitySolver::set_joint_weights().
+  JointVector joint_weights{};
   /// Whether the servo takes another way to a pose target that rests where its own way does not arrive; see Servo.
   bool guided = false;
 };
@@ -221,9 +226,22 @@ class Servo {
 
   /// Takes over from another servo of the same arm and dt, while the arm moves: rule and options are this servo's, and
   /// its command is faded in from the other servo's last velocity over soft_start. The posture is the other servo's
-  /// unless the options have one. If the other servo has not started, nothing happens. Real time.
+  /// unless the options have one, and the tool the other servo's unless this servo has one. If the other servo has not
+  /// started, nothing happens. Real time.
   /// \throws Error where the number of joints or dt differ
   void continue_from(const Servo& other);
+
+  /// Puts a tool on the tip, from the next cycle on: targets, twists, tip() and all poses of the answers are then those
+  /// of the tool's frame. q̇ does not jump: as after a reset() of a moving arm, the command is faded in from the last
+  /// velocity over soft_start, inside all limits. A target that the tip has reached is another target for the tool.
+  /// length_scale and max_linear_error stay. The inertia of a tool is for Chain::with_tool() and Dynamics. The guide of
+  /// a servo whose task leaves rows out needs a chain with the tool, and is Off while there is one. Real time.
+  /// \param tool frame of the tool in chain().tip(); the identity takes the tool off. A rotation within
+  ///     kRotationTolerance is made one
+  /// \return false where this is not a pose; then nothing changes
+  bool set_tool(const Pose& tool) noexcept;
+  /// As given to set_tool(); the identity at first.
+  const Pose& tool() const noexcept { return tool_; }
 
   /// Changes the rule from the next cycle on; the rest of the history stays.
   /// \throws Error where a parameter is out of its range
@@ -239,7 +257,7 @@ class Servo {
   const JointVector& q() const noexcept { return tracker_.q(); }
   /// (n,) velocity of the last cycle.
   const JointVector& qdot() const noexcept { return tracker_.qdot(); }
-  /// Pose of the tip at q().
+  /// Pose of the tip at q(), of the tool where there is one.
   const Pose& tip() const noexcept { return state_.tip; }
   /// [m], the length that weighs as much as one radian.
   double length_scale() const noexcept { return solver_.length_scale(); }
@@ -253,6 +271,8 @@ class Servo {
  private:
   friend class detail::Guide;  // predicts with a servo of its own
   void begin(const JointRef& posture) noexcept;
+  // Pose and Jacobian of the tip, with the tool, at the reference.
+  void locate() noexcept;
   ServoStep stop(Status status) noexcept;
   ServoStep resolve(const Twist& twist, const Twist* feedforward, bool fade, const JointVector* goal) noexcept;
   JointVector posture_velocity() const noexcept;
@@ -261,6 +281,10 @@ class Servo {
   bool fade_in(JointVector& qdot, bool fade) noexcept;
   void take(ServoStep& step, bool achieved) noexcept;
   void watch(const Pose& target, ServoStep& step) noexcept;
+
+  // The joints' weights in the least squares below: √(w_j / min w), all 1 without weights.
+  bool weighs_joints() const noexcept { return solver_.lightness().size() != 0; }
+  double heaviness(int i) const noexcept { return weighs_joints() ? 1.0 / std::sqrt(solver_.lightness()[i]) : 1.0; }
 
   // servo_priority.cpp
   bool has_exact() const noexcept { return options_.exact != std::array<bool, 6>{}; }
@@ -308,6 +332,8 @@ class Servo {
   JointVector last_way_;        // the fastest q̇ since the motion turned round last
   int reversals_ = 0;
   std::int64_t rough_targets_ = 0;
+  Pose tool_ = Pose::Identity();
+  bool with_tool_ = false;  // tool_ is not the identity
   Pose measured_tip_ = Pose::Identity(), last_target_ = Pose::Identity();
   double max_linear_error_;
   double fade_ = 1.0, rested_ = 0.0;

@@ -183,6 +183,10 @@ class ServoLoop {
   /// As follow().
   /// \param twist [v; ω], base axes, at the tip's origin
   void follow_twist(const Twist& twist, double timeout, LoopToken token = {});
+  /// Puts a tool on the tip from the next cycle on, without a jump: see Servo::set_tool(). The live command goes on,
+  /// and is then the tool's. The tool stays through configure(), until another. Takes no lock in the loop.
+  /// \throws Error where the tool is not a pose, or somebody else owns the arm
+  void set_tool(const Pose& tool, LoopToken token = {});
   /// Stops the arm as fast as its limits allow, until the next command.
   void hold() noexcept;
 
@@ -218,6 +222,8 @@ class ServoLoop {
     std::int64_t deadline = 0;  // [ns] of the steady clock
     Pose target = Pose::Identity();
     Twist twist = Twist::Zero();
+    Pose tool = Pose::Identity();
+    unsigned tools = 0;  // set_tool() was called so often
   };
   struct Measurement {
     JointVector q, qdot;
@@ -255,6 +261,7 @@ class ServoLoop {
   void refuse_stranger(LoopToken token) const;
   void refuse_motion() const;
   void command(const Command& command, LoopToken token);
+  void post(const Command& command) noexcept;
   void make_thread();
   bool end(double timeout) noexcept;
   void join() noexcept;
@@ -274,13 +281,15 @@ class ServoLoop {
   int configurations_ = 0;
   LoopToken owner_;
   std::string owner_name_;
+  Command posted_;  // the newest, with the tool
 
   detail::Mailbox<Command> commands_;
   detail::Mailbox<Measurement> measurements_;
   std::atomic_flag measuring_;
   std::int64_t measured_ = 0;  // [ns] since start(), of the last measurement; the loop's
 
-  Driver* driver_;  // the loop's
+  Driver* driver_;            // the loop's
+  unsigned tools_taken_ = 0;  // the loop's: Command::tools of the tool that the servo has
   std::atomic<Driver*> incoming_{nullptr}, done_{nullptr};
 
   std::vector<LoopSample> samples_;

@@ -53,6 +53,14 @@ class VelocitySolver {
   /// \throws Error where an entry is negative or not finite
   void set_pace(const Pace& pace);
 
+  /// How much the motion of each joint counts, where there are more joints than rows: of all motions that move the tip
+  /// as the rule says, the answer has the least Σ w_j (q̇_j − q̇_posture,j)². Only ratios of weights matter. Singular
+  /// values, thresholds and status are those without weights, which say nothing of how hard the arm is to move.
+  /// Jacobians of another number of joints are solved without weights.
+  /// \param weights (n,) > 0, finite, at most 1e6 apart; empty: all 1
+  /// \throws Error where an entry is out of its range
+  void set_joint_weights(const JointRef& weights);
+
   /// Changes the rule; the warm start stays.
   /// \throws Error where a parameter is out of its range
   void set_method(const Method& method);
@@ -67,6 +75,8 @@ class VelocitySolver {
   const Spectrum& spectrum() const noexcept { return spectrum_; }
   /// What the rule said of each direction of spectrum() in the last solve().
   const Resolution& resolution() const noexcept { return resolution_; }
+  /// (n,) min_j w_j / w_j of the joint weights, in (0, 1]; empty: there are none.
+  const JointVector& lightness() const noexcept { return lightness_; }
   /// As given to set_pace().
   const Pace& pace() const noexcept { return pace_; }
 
@@ -95,6 +105,7 @@ class VelocitySolver {
   double length_scale_;
   Task task_;
   Pace pace_;
+  JointVector lightness_;
   Spectrum spectrum_;
   Resolution resolution_;
 };

@@ -80,6 +80,7 @@ std::vector<LinkSphere> without_inner(const std::vector<LinkSphere>& spheres) {
 ArmSpheres::ArmSpheres(const Chain& chain, std::vector<LinkSphere> spheres)
     : chain_(chain), spheres_(std::move(spheres)) {
   const std::vector<Segment>& segments = chain.segments();
+  require(!chain.has_mimics(), "the arm has joints that mimic others; spheres support joints that move by themselves");
   require(!spheres_.empty(), "an arm needs at least one sphere");
   require(spheres_.size() <= kMaxSpheres, "the arm has ", spheres_.size(), " spheres; at most ", kMaxSpheres,
           " are supported");

@@ -13,7 +13,9 @@ namespace {
 std::vector<double> key_of(const Chain& chain) {
   std::vector<double> key;
   const auto add = [&key](const auto& values) { key.insert(key.end(), values.data(), values.data() + values.size()); };
-  for (std::size_t i = 0; i < static_cast<std::size_t>(chain.dof()); ++i) {
+  for (std::size_t i = 0; i < static_cast<std::size_t>(chain.moving()); ++i) {
+    const Coupling& coupling = chain.couplings()[i];
+    key.insert(key.end(), {static_cast<double>(coupling.joint), coupling.multiplier, coupling.offset});
     const JointConstants& joint = chain.constants()[i];
     add(joint.rotation);
     add(joint.translation);

@@ -107,7 +107,7 @@ struct SupportPlanner::Work {
   Eigen::VectorXd values;
 
   Work(Chain c, BatchCostPtr l, int count, std::optional<CollisionCheck> o)
-      : chain(std::move(c)),
+      : chain(detail::with_even_acceleration(c)),
         cost(std::move(l)),
         obstacles(std::move(o)),
         sets(SingularSets::of(chain)),
@@ -385,10 +385,11 @@ SupportStates SupportPlanner::draw(const JointVector& start, const JointVector& 
   return w.result(start, goal, q, w.value(q), 0, false);
 }
 
-Trajectory SupportPlanner::plan(const JointVector& start, const JointVector& goal, const GradientOptions& options) {
+Trajectory SupportPlanner::plan(const JointVector& start, const JointVector& asked, const GradientOptions& options) {
   constexpr double kDeviation = 0.5;  // [rad or m] of first guesses, half-way
   require(options.restarts >= 0, "restarts = ", options.restarts, " must be at least 0");
   check(options.duration);
+  const JointVector goal = options.whole_turns ? asked : nearest_turn(work_->chain, start, asked);
   work_->require_free(start, goal);
   const Stopwatch time;
   const auto from = [&](const std::vector<double>& guess) {
@@ -406,8 +407,9 @@ Trajectory SupportPlanner::plan(const JointVector& start, const JointVector& goa
   return best;
 }
 
-Trajectory SupportPlanner::plan(const JointVector& start, const JointVector& goal, const StochasticOptions& options) {
+Trajectory SupportPlanner::plan(const JointVector& start, const JointVector& asked, const StochasticOptions& options) {
   check(options.duration);
+  const JointVector goal = options.whole_turns ? asked : nearest_turn(work_->chain, start, asked);
   work_->require_free(start, goal);
   const Stopwatch time;
   const SupportStates found = stochastic(start, goal, options);

@@ -85,7 +85,7 @@ TimeOptimal::TimeOptimal(Chain chain, JointCostPtr cost, const TimeOptimalOption
 
 TimeOptimal::TimeOptimal(Chain chain, JointCostPtr cost, const TimeOptimalOptions& options,
                          std::optional<SingularSets> sets, std::optional<CollisionCheck> obstacles)
-    : chain_(std::move(chain)),
+    : chain_(detail::with_even_acceleration(chain)),
       cost_(std::move(cost)),
       options_(options),
       sets_(std::move(sets)),
@@ -250,7 +250,12 @@ double TimeOptimal::along(const Trajectory& plan) const {
   return options_.time_weight * plan.duration + options_.effort_weight * effort + marked / static_cast<double>(kDense);
 }
 
-Trajectory TimeOptimal::plan(const TimeOptimalProblem& problem) {
+Trajectory TimeOptimal::plan(const TimeOptimalProblem& asked) {
+  TimeOptimalProblem problem = asked;
+  if (!options_.whole_turns) {
+    check(problem);
+    problem.goal = nearest_turn(chain_, problem.start, problem.goal);
+  }
   if (!obstacles_) return best_plan(problem);
   check(problem);
   obstacles_->require_free("start", problem.start);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 #include <fstream>
+#include <numbers>
 #include <sstream>
 #include <utility>
 
@@ -189,6 +190,18 @@ Trajectory Trajectory::load(const std::string& file) {
     }
   }
   return plan;
+}
+
+JointVector nearest_turn(const Chain& chain, const JointRef& start, const JointRef& goal) {
+  require(start.size() == chain.dof() && goal.size() == chain.dof(), "start has ", start.size(), " entries, goal ",
+          goal.size(), ", the chain ", chain.dof(), " joints");
+  JointVector out = goal;
+  for (int i = 0; i < chain.dof(); ++i) {
+    if (chain.joint_types()[static_cast<std::size_t>(i)] != JointType::Continuous) continue;
+    const double turns = std::round((goal[i] - start[i]) / (2.0 * std::numbers::pi));
+    if (turns != 0.0) out[i] -= 2.0 * std::numbers::pi * turns;
+  }
+  return out;
 }
 
 }  // namespace sigmaik::planning

@@ -37,6 +37,9 @@ class TimeOptimalOptions(typing.TypedDict, total=False):
     clearance_width: typing.SupportsFloat | typing.SupportsIndex
     """[1/rad²] > 0: sets of codimension above 1 count as crossed where ψ < 1/(2 clearance_width). Where a call has
     eta2, its default is eta2. Default: 400.0."""
+    whole_turns: bool
+    """whether goals count whole turns. False: continuous joints take the shorter way, of at most half a turn. Default:
+    False."""
 
 
 class GradientOptions(typing.TypedDict, total=False):
@@ -57,6 +60,9 @@ class GradientOptions(typing.TypedDict, total=False):
     duration: typing.SupportsFloat | typing.SupportsIndex | None
     """[s] > 0. None: the shortest that keeps the limits of velocity and acceleration, 1 s where there are none.
     Default: None."""
+    whole_turns: bool
+    """whether goals count whole turns. False: continuous joints take the shorter way, of at most half a turn. Default:
+    False."""
 
 
 class StochasticOptions(typing.TypedDict, total=False):
@@ -83,6 +89,9 @@ class StochasticOptions(typing.TypedDict, total=False):
     """whether `gradient` finishes the motion that the samples found. Default: False."""
     duration: typing.SupportsFloat | typing.SupportsIndex | None
     """[s] as for `gradient`. Default: None."""
+    whole_turns: bool
+    """whether goals count whole turns. False: continuous joints take the shorter way, of at most half a turn. Default:
+    False."""
 
 
 class CartOptions(typing.TypedDict, total=False):

@@ -40,7 +40,8 @@ def time_optimal(
     Parameters
     ----------
     start, goal
-        (n,) [rad or m] within the limits. Whole turns count: 0 and 2π are different places.
+        (n,) [rad or m] within the limits. Joints without position limits go to the nearest turn of the goal, unless
+        ``whole_turns`` is True: then 0 and 2π are different places.
     cost
         Of the nodes: `costs` that add up, any `JointCost`, or one of `avoid`'s words.
     obstacles
@@ -78,6 +79,8 @@ def time_optimal(
     sets = avoid.pop("sets", None) or singularities.of(chain)
     eta2 = avoid.get("eta2", costs.ETA2)
     if solver != "sigmaik":
+        if not given.pop("whole_turns", False):
+            goal = _core.nearest_turn(chain, start, goal)
         return _other_solver(solver)(chain, sets, (start, goal, *velocities), given, avoid)
     total = _marked(sets, **avoid) if cost is None else Cost.of(cost)
     total, scene = add_clear(total, chain, obstacles, given)

@@ -42,7 +42,8 @@ def gradient(
     Parameters
     ----------
     start, goal
-        (n,) [rad or m] within the limits. Whole turns count.
+        (n,) [rad or m] within the limits. Joints without position limits go to the nearest turn of the goal,
+        unless ``whole_turns`` is True.
     obstacles
         What to keep clear of. ValueError where start or goal touches it; where the motion found does, `status` is
         "failed" and there are no samples.

@@ -36,6 +36,10 @@ def build(
     """
     import mujoco  # type: ignore[import-untyped]
 
+    if any(segment.mimic is not None for segment in chain.segments):
+        raise _core.Error(
+            "the arm has joints that mimic others; the simulation supports joints that move by themselves"
+        )
     spec = mujoco.MjSpec()
     spec.option.gravity = np.asarray(gravity, dtype=np.float64)
     spec.option.timestep = timestep

@@ -43,6 +43,7 @@ struct GradientOptions {
   /// [s] > 0 of plan()'s motion; none: the shortest that keeps the limits of velocity and acceleration, 1 s where there
   /// are none
   std::optional<double> duration = std::nullopt;
+  bool whole_turns = false;  ///< of plan(), as in TimeOptimalOptions
 };
 
 /// Settings of SupportPlanner::stochastic().
@@ -58,6 +59,7 @@ struct StochasticOptions {
   std::uint64_t seed = 0;      ///< the same seed gives the same motion
   bool refine = false;         ///< plan() finishes with gradient() from the motion found
   std::optional<double> duration = std::nullopt;  ///< [s] as for the gradient
+  bool whole_turns = false;                       ///< of plan(), as in TimeOptimalOptions
 };
 
 /// Plans for one arm and one cost, and keeps the covariance's factors. One object serves one thread.
@@ -95,12 +97,12 @@ class SupportPlanner {
   /// touches no obstacle. The status is Failed if every motion touches an obstacle, Optimal if the search stopped by
   /// itself, else Feasible. The cost is the objective.
   /// \throws Error as gradient(), or where start or goal touches an obstacle
-  Trajectory plan(const JointVector& start, const JointVector& goal, const GradientOptions& options);
+  Trajectory plan(const JointVector& start, const JointVector& asked, const GradientOptions& options);
 
   /// The same for stochastic(). The status is Feasible unless the motion was refined: no minimum is claimed. Where the
   /// refined motion touches an obstacle between its states, the answer is the motion before.
   /// \throws Error as stochastic(), or where start or goal touches an obstacle
-  Trajectory plan(const JointVector& start, const JointVector& goal, const StochasticOptions& options);
+  Trajectory plan(const JointVector& start, const JointVector& asked, const StochasticOptions& options);
 
   /// Number of support states.
   int states() const noexcept;

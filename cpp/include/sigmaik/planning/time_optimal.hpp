@@ -46,12 +46,15 @@ struct TimeOptimalOptions {
   bool restarts = true;
   /// [1/rad²] > 0, η₂ of plan()'s clearance: see clearance()
   double clearance_width = 400.0;
+  /// Whether plan() counts whole turns. If not, joints without position limits (JointType::Continuous) take the shorter
+  /// way: see nearest_turn().
+  bool whole_turns = false;
 };
 
 /// Ends of a motion, and where to look for it.
 struct TimeOptimalProblem {
   JointVector start;           ///< (n,) [rad or m] within the limits; whole turns count
-  JointVector goal;            ///< (n,) [rad or m] within the limits; whole turns count
+  JointVector goal;            ///< (n,) [rad or m] within the limits; solve() counts whole turns
   JointVector start_velocity;  ///< (n,) [rad/s or m/s] within the limits; empty: at rest
   JointVector goal_velocity;   ///< (n,) [rad/s or m/s] within the limits; empty: at rest
   /// (n,) [rad or m] by how much the first guess, the straight line, is bent half-way; empty: not at all.
@@ -99,7 +102,7 @@ class TimeOptimal {
   /// the motion with the smaller along(), because nodes may lie on both sides of a wall that the motion between the
   /// nodes goes through. A motion that touches an obstacle between its nodes has failed.
   /// \throws Error as solve(), or where start or goal touches an obstacle
-  Trajectory plan(const TimeOptimalProblem& problem);
+  Trajectory plan(const TimeOptimalProblem& asked);
 
   /// \throws Error where an end is outside its limits, not finite or of a wrong size
   void check(const TimeOptimalProblem& problem) const;

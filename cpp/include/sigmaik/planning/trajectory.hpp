@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include <sigmaik/chain.hpp>
 #include <sigmaik/layout.hpp>
 #include <sigmaik/planning/clearance.hpp>
 
@@ -72,6 +73,11 @@ struct Trajectory {
   /// \throws Error where the file cannot be read, or is not that of a trajectory
   static Trajectory load(const std::string& file);
 };
+
+/// The goal (n,) with each continuous joint on the turn nearest to the start: at most π away. Poses stay the same;
+/// other joints stay as they are.
+/// \throws Error where a size is wrong
+JointVector nearest_turn(const Chain& chain, const JointRef& start, const JointRef& goal);
 
 SIGMAIK_SAME_LAYOUT(Trajectory, JointSamples, Clearance, Crossing);
 
