@@ -173,7 +173,7 @@ void TargetStream::reset() noexcept {
   counts_ = {};
   count_ = candidates_ = 0;
   shift_ = period_ = 0.0;
-  stepped_ = false;
+  stepped_ = other_clock_ = called_ = false;
   last_ = {};
   placed_ = timed_ = false;
 }
@@ -237,16 +237,20 @@ SampleStatus TargetStream::push(double time, const Pose& pose) noexcept {
 
 // Refuses a sample, unless so many agree with it that the target is at another place, or the stamps of another clock.
 SampleStatus TargetStream::refuse(const Sample& next, SampleStatus why, double stamp) noexcept {
-  const bool agrees = candidates_ > 0 && next.time > candidate_.time && reachable(candidate_, next);
+  const bool clock = of_another_clock(next.time);
+  bool agrees = candidates_ > 0 && next.time > candidate_.time && reachable(candidate_, next) && clock == other_clock_;
+  if (clock && agrees) agrees = next.time - candidate_.time <= options_.timeout && keeps_pace(next.time);
   candidates_ = agrees ? candidates_ + 1 : 1;
   candidate_ = next;
+  other_clock_ = clock;
   if (candidates_ == 1) {
     first_stamp_ = next.time;
     first_clock_ = time_;
   }
-  const bool clock = of_another_clock(next.time);
-  if (clock ? !another_clock_agrees() : candidates_ < options_.relocate) return why;
+  const bool long_enough = candidates_ >= 3 || (candidates_ == 2 && next.time - first_stamp_ >= 0.5 * options_.timeout);
+  if (clock ? !long_enough : candidates_ < options_.relocate) return why;
   candidates_ = 0;
+  other_clock_ = false;
   Sample accepted = next;
   if (clock) {
     shift_ = std::abs(stamp - time_) <= options_.timeout ? 0.0 : stamp - time_;
@@ -261,23 +265,26 @@ SampleStatus TargetStream::refuse(const Sample& next, SampleStatus why, double s
 }
 
 // Whether a stamp is so far from the clock of at() that this clock or that of the stamps has stepped. A stamp that is
-// late without a step is that of a late sample, and at() may have paused while samples came.
+// late without a step is that of a late sample.
 bool TargetStream::of_another_clock(double time) const noexcept {
   if (!timed_) return false;
   const double newest = count_ > 0 ? sample(count_ - 1).time : 0.0, far = options_.timeout;
-  if (time > time_ + far) return count_ == 0 || time > newest + far;
-  return time < time_ - far && (stepped_ || (count_ > 0 && time < newest - far));
+  // at() may have paused while samples came.
+  if (time > time_ + far) return called_ || count_ == 0 || time > newest + far || (other_clock_ && candidates_ > 0);
+  if (time >= time_ - far) return false;
+  const bool set_right = shift_ != 0.0 && std::abs(time + shift_ - time_) <= far;
+  return stepped_ || set_right || (count_ > 0 && time < newest - far) || (other_clock_ && candidates_ > 0);
 }
 
 // Whether the candidates are as far apart as the calls of at(): a burst of old samples is not.
-bool TargetStream::another_clock_agrees() const noexcept {
+bool TargetStream::keeps_pace(double time) const noexcept {
   constexpr double kReading = 5e-3;  // [s] from the last call of at() to a sample
-  const double stamps = candidate_.time - first_stamp_, clock = time_ - first_clock_;
-  if (std::abs(stamps - clock) > 0.5 * stamps + kReading) return false;
-  return candidates_ >= 3 || (candidates_ == 2 && stamps >= 0.5 * options_.timeout);
+  const double stamps = time - first_stamp_, clock = time_ - first_clock_;
+  return std::abs(stamps - clock) <= 0.5 * stamps + kReading + period_;
 }
 
 void TargetStream::start(const Sample& next) noexcept {
+  called_ = false;
   first_ = 0;
   count_ = 1;
   history_[0] = next;
@@ -288,6 +295,7 @@ void TargetStream::start(const Sample& next) noexcept {
 }
 
 void TargetStream::extend(const Sample& next) noexcept {
+  called_ = false;
   int at = 0;
   if (options_.mode == StreamMode::Interpolate) {
     // Decimate a fast sensor so that the ring still covers `latency`; always keep the newest sample.
@@ -440,6 +448,7 @@ void TargetStream::hold_still() noexcept {
 
 Target TargetStream::at(double time) noexcept {
   constexpr double kReading = 5e-3;  // [s] two threads may read the clock in turn
+  constexpr double kSlowest = 1.0;   // [s] a loop may be as slow, and a second step is seen
   if (!std::isfinite(time)) {
     Target held = last_;
     held.twist.setZero();
@@ -452,12 +461,13 @@ Target TargetStream::at(double time) noexcept {
     if (count_ > 0) last_.status = StreamStatus::Stale;
     hold_still();
     if (count_ > 0) last_.age = std::max(0.0, time - sample(count_ - 1).time);
-    period_ = timed_ ? std::max(0.0, time - time_) : 0.0;
+    period_ = timed_ ? std::clamp(time - time_, 0.0, kSlowest) : 0.0;
     time_ = time;
     timed_ = true;
     return last_;
   }
   const double dt = timed_ ? time - time_ : 0.0;
+  called_ = true;
   period_ = dt;
   if (count_ == 0 && placed_ && last_.status == StreamStatus::Stale) last_.age += dt;
   if (count_ > 0) {

@@ -171,7 +171,7 @@ class TargetStream {
   bool reachable(const Sample& from, const Sample& to) const noexcept;
   bool of_another_clock(double time) const noexcept;
   SampleStatus refuse(const Sample& next, SampleStatus why, double stamp) noexcept;
-  bool another_clock_agrees() const noexcept;
+  bool keeps_pace(double time) const noexcept;
   bool step_of_clock(double time) noexcept;
   void hold_still() noexcept;
   void start(const Sample& sample) noexcept;
@@ -195,6 +195,8 @@ class TargetStream {
   double first_stamp_ = 0.0, first_clock_ = 0.0;  // of the first candidate: its time, and that of the last at() then
   double shift_ = 0.0;                            // [s] the stamps' clock minus that of at()
   double period_ = 0.0;                           // [s] between the last two calls of at()
+  bool other_clock_ = false;                      // the candidates' stamps are off from the clock of at()
+  bool called_ = false;                           // at() was called since the newest sample
   bool stepped_ = false;                          // the clock of at() has stepped forwards, and no sample followed
   Target last_;
   Twist acceleration_ = Twist::Zero();  // of last_, the derivative of its twist
