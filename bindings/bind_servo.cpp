@@ -15,6 +15,16 @@ ServoStep checked(const ServoStep& step) {
   return step;
 }
 
+// The time of a cycle. A time outside the range is an error before the servo does anything.
+std::optional<double> cycle_argument(const Servo& servo, const std::optional<double>& dt) {
+  const double nominal = servo.options().dt;
+  constexpr double kRounding = 1e-9;
+  if (!dt || *dt == nominal) return dt;
+  if (*dt >= kShortestCycle * nominal * (1.0 - kRounding) && *dt <= kLongestCycle * nominal * (1.0 + kRounding)) return dt;
+  throw Error("dt = " + text_of(*dt) + " s must be from " + text_of(kShortestCycle * nominal) + " to " +
+              text_of(kLongestCycle * nominal) + " s, a tenth to 20 times the servo's dt");
+}
+
 // This getter throws until the first reset: nothing stands anywhere before.
 template <typename Get>
 auto once_started(Get get) {
@@ -62,6 +72,9 @@ void bind_step(py::module_& m) {
       .def_property_readonly(
           "limiting_joints", [](const ServoStep& s) { return indices(s.limiting_joints); },
           "Indices of the joints held at a limit that the rule's answer would break.")
+      .def_readonly("tool_speed_limits", &ServoStep::tool_speed_limits, "max_tool_speed has slowed the motion down.")
+      .def_readonly("tool_speed", &ServoStep::tool_speed,
+                    "[m/s] of the fastest checked point over the cycle; 0 without a max_tool_speed.")
       .def_property_readonly(
           "singular_values", [](const ServoStep& s) { return to_numpy(s.singular_values); },
           "Singular values of the weighted task Jacobian, from large to small.")
@@ -150,35 +163,42 @@ void bind_measurement(py::class_<Servo>& c) {
 void bind_cycle(py::class_<Servo>& c) {
   c.def(
        "update",
-       [](Servo& s, const py::object& target, const MaybeArray& feedforward) {
+       [](Servo& s, const py::object& target, const MaybeArray& feedforward, std::optional<double> dt) {
          require_started(s);
+         const std::optional<double> time = cycle_argument(s, dt);
          const Pose pose = pose_argument(target, "target");
          const Twist twist = feedforward ? twist_argument(*feedforward, "feedforward") : Twist(Twist::Zero());
-         return checked(s.update(pose, twist));
+         return checked(s.update(pose, twist, time));
        },
-       py::arg("target"), py::arg("feedforward") = py::none(),
+       py::arg("target"), py::arg("feedforward") = py::none(), py::arg("dt") = py::none(),
        "One cycle towards a pose (4, 4) of the tip in the base.\n\n"
        "feedforward: (6,) twist [v; ω] of a target that moves, base axes, at its origin, added to gain × error. "
        "Behind\n"
        "    a target of constant twist the tip lags by speed/gain without it, and not at all with it.\n"
-       "Raises Error, and holds, where the target is not a pose.")
+       "dt: [s] the time since the last call on the robot's clock, from a tenth to 20 times the servo's dt; None: the\n"
+       "    servo's dt. After a lost packet, or in a loop that is not even, the limits then hold against the clock: the\n"
+       "    position command advances by q̇ dt, and q̇ changes by no more than the acceleration limit times dt.\n"
+       "Raises Error, and holds, where the target is not a pose, or dt is outside its range.")
       .def(
           "update_twist",
-          [](Servo& s, const ArrayLike& twist, const std::string& frame, const MaybeArray& point) {
+          [](Servo& s, const ArrayLike& twist, const std::string& frame, const MaybeArray& point,
+             std::optional<double> dt) {
             require_started(s);
+            const std::optional<double> time = cycle_argument(s, dt);
             const Twist asked = twist_argument(twist, "twist");
-            if (frame == "base" && !point) return checked(s.update_twist(asked));
+            if (frame == "base" && !point) return checked(s.update_twist(asked, time));
             const Frame axes = task_argument(py::none(), frame).frame;
             const Eigen::Vector3d at = point                 ? vector_argument(*point, "point")
                                        : axes == Frame::Tool ? Eigen::Vector3d(Eigen::Vector3d::Zero())
                                                              : Eigen::Vector3d(s.tip().translation());
-            return checked(s.update_twist(asked, axes, at));
+            return checked(s.update_twist(asked, axes, at, time));
           },
-          py::arg("twist"), py::arg("frame") = "base", py::arg("point") = py::none(),
+          py::arg("twist"), py::arg("frame") = "base", py::arg("point") = py::none(), py::arg("dt") = py::none(),
           "One cycle along a twist (6,) [v; ω].\n\n"
           "frame: the axes of twist and point, 'base' or 'tool'; jog devices send 'tool'.\n"
           "point: (3,) [m] that moves at v: in base, or with frame='tool' from the tip's origin. None: the tip's "
-          "origin.")
+          "origin.\n"
+          "dt: [s] the time since the last call, as for `update`.")
       .def_property_readonly("rough_targets", &Servo::rough_targets,
                              "Targets of update() whose rotation was off by more than rounding (up to 5e-4 in RᵀR), "
                              "and was made one.")
@@ -194,7 +214,11 @@ void bind_cycle(py::class_<Servo>& c) {
       .def_property_readonly(
           "tool", [](const Servo& s) { return to_numpy(s.tool().matrix()); },
           "(4, 4) of set_tool(), in the chain's tip.")
-      .def("hold", &Servo::hold, "One cycle of the fastest stop that the limits allow, or of rest: HOLDING.")
+      .def(
+          "hold", [](Servo& s, std::optional<double> dt) { return s.hold(cycle_argument(s, dt)); },
+          py::arg("dt") = py::none(),
+          "One cycle of the fastest stop that the limits allow, or of rest: HOLDING.\n\n"
+          "dt: [s] the time since the last call, as for `update`.")
       .def("continue_from", &Servo::continue_from, py::arg("other"),
            "Takes over from another servo of the same arm and dt, in the midst of its motion.\n\n"
            "Rule and options are this one's; what it commands is faded in from the other's last velocity over "

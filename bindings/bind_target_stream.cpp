@@ -49,16 +49,18 @@ void bind_statuses(py::module_& m) {
                                 "What a target is, ordered from the best to the worst.")
       .value("TRACKING", StreamStatus::Tracking, "as the samples say, or within the horizon of the last one")
       .value("COASTING", StreamStatus::Coasting, "longer without a sample than the horizon: coming to rest")
-      .value("STALE", StreamStatus::Stale, "longer than the timeout: holding still")
+      .value("STALE", StreamStatus::Stale, "longer than the timeout, or a clock has stepped: holding still")
       .value("WAITING", StreamStatus::Waiting, "no sample yet: where reset() said, or nowhere")
       .finalize();
   py::native_enum<SampleStatus>(m, "SampleStatus", "enum.IntEnum", "What became of a sample.")
       .value("ACCEPTED", SampleStatus::Accepted)
       .value("RELOCATED", SampleStatus::Relocated,
-             "accepted after a run of refused ones: the target is elsewhere, or the clock was set")
+             "accepted after a run of refused ones: the target is elsewhere, or a clock was set")
       .value("OUTLIER", SampleStatus::Outlier, "refused: too far from the last one for max_speed or max_angular_speed")
       .value("OUT_OF_ORDER", SampleStatus::OutOfOrder, "refused: its stamp is not later than the last one's")
       .value("INVALID", SampleStatus::Invalid, "refused: more than 10⁹ m away; what is not a pose raises")
+      .value("AHEAD", SampleStatus::Ahead,
+             "refused: its stamp is later than the time of at() by more than the timeout")
       .finalize();
 }
 
@@ -69,6 +71,9 @@ void bind_answers(py::module_& m) {
       .def_readonly("outliers", &SampleCounts::outliers)
       .def_readonly("out_of_order", &SampleCounts::out_of_order)
       .def_readonly("invalid", &SampleCounts::invalid)
+      .def_readonly("ahead", &SampleCounts::ahead, "Samples whose stamp was ahead of the clock of at().")
+      .def_readonly("clock_steps", &SampleCounts::clock_steps,
+                    "Steps of the clock of at(), and of the stamps against this clock.")
       .def_readonly("rough", &SampleCounts::rough, "Samples whose rotation was off by more than rounding.")
       .def("__repr__", [](const SampleCounts& c) {
         return "SampleCounts(accepted=" + std::to_string(c.accepted) + ", relocated=" + std::to_string(c.relocated) +
@@ -127,7 +132,8 @@ void bind_stream(py::module_& m) {
           "A sample: when it was taken [s], and the pose (4, 4) then. Raises Error where it is not a pose.")
       .def(
           "at", [](TargetStream& s, double time) { return s.at(time_argument(time)); }, py::arg("time"),
-          "The target at a time [s] not before that of the last call; else the last one again.")
+          "The target at a time [s]. Where the clock steps, back or forth, the target holds still: STALE, twist zero;\n"
+          "samples of the new clock lead on from there.")
       .def_property_readonly("counts", &TargetStream::counts, py::return_value_policy::copy,
                              "How many samples had which fate.")
       .def("__repr__", [](const TargetStream& s) {

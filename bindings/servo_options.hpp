@@ -27,6 +27,30 @@ struct Fields<LimitOptions> {
   };
 };
 
+/// Points, a row each; as the columns of the struct.
+template <>
+struct Argument<ToolPoints> {
+  static constexpr bool kNone = true;
+  static std::string type() { return "numpy.typing.ArrayLike | None"; }
+  static std::string text(const ToolPoints&) { return "None"; }
+  static ToolPoints from(py::handle object, const char* what) {
+    const auto rows = py::array_t<double, py::array::c_style | py::array::forcecast>::ensure(object);
+    if (!rows) PyErr_Clear();
+    constexpr py::ssize_t kMost = ToolPoints::MaxColsAtCompileTime;
+    if (!rows || rows.ndim() != 2 || rows.shape(1) != 3 || rows.shape(0) > kMost) {
+      refuse(what, "an array (k, 3) of at most " + std::to_string(kMost) + " points", object);
+    }
+    ToolPoints points(3, rows.shape(0));
+    std::copy(rows.data(), rows.data() + rows.size(), points.data());
+    return points;
+  }
+  static py::object to(const ToolPoints& value) {
+    py::array_t<double> out({value.cols(), Eigen::Index{3}});
+    std::copy(value.data(), value.data() + value.size(), out.mutable_data());
+    return value.size() == 0 ? py::none() : py::object(out);
+  }
+};
+
 template <>
 struct Words<Frame> {
   static constexpr std::array all{Word<Frame>{"base", Frame::Base}, Word<Frame>{"tool", Frame::Tool}};
@@ -96,6 +120,12 @@ struct Fields<ServoOptions> {
           "'redistribute' first uses the motion that does not move the tool."),
       field("exact", &ServoOptions::exact,
             "(6,) truth values: the rows (vx, vy, vz, ωx, ωy, ωz) that come before the others in every cycle."),
+      field("max_tool_speed", &ServoOptions::max_tool_speed,
+            "[m/s] > 0: no checked point of the arm (the tip's origin, the origin of each movable joint's link, "
+            "speed_points) moves faster in any cycle; the motion slows down along its direction. 0.25 is the reduced "
+            "speed of ISO 10218-1. inf: no such limit."),
+      field("speed_points", &ServoOptions::speed_points,
+            "(k, 3) [m] further points that max_tool_speed checks, in the tip's frame, k ≤ 8; None: none."),
       field("length_scale", &ServoOptions::length_scale,
             "[m] > 0: 1 rad/s weighs as much as length_scale m/s, as for VelocitySolver. None: "
             "chain.characteristic_length."),

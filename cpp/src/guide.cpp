@@ -123,6 +123,8 @@ double Guide::own_time(const Left& left, const Servo& servo) const noexcept {
   const ServoOptions& o = servo.options();
   const double linear = left.linear * ik_.chain().characteristic_length() / servo.max_linear_error();
   double time = left.linear > kArrived ? (linear + kSettle) / o.gain_linear : 0.0;
+  // The ways of the tool and of an elbow that turns with it; no time without a largest speed.
+  time += (left.linear + 2.0 * left.angular) * ik_.chain().characteristic_length() / o.max_tool_speed;
   if (left.angular > kTurned) time = std::max(time, (left.angular / o.max_angular_error + kSettle) / o.gain_angular);
   return time;
 }
@@ -141,7 +143,7 @@ bool Guide::same(const Pose& target) noexcept {
 }
 
 void Guide::advise(const Pose& target, const Twist& error, const Servo& servo) noexcept {
-  const double dt = servo.options().dt;
+  const double dt = servo.cycle();
   if (with_tool_ && !servo.options().task.whole()) {  // the search has the tip's rows, and not the tool's
     state_ = GuideState::Off;
     return;

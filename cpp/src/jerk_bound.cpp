@@ -59,23 +59,28 @@ class Upper {
 
   // How far a stop after velocity v overshoots the position limit on the way (overshoot), and at its end (end).
   double overshoot(double v) const noexcept {
-    return v + JerkStop(v, slope_at(v), s_.jerk, s_.braking).rise() - s_.room;
+    return highest_way(v, slope_at(v), s_.jerk, s_.braking, s_.longest) - s_.room;
   }
-  double end(double v) const noexcept { return v + JerkStop(v, slope_at(v), s_.jerk, s_.braking).distance() - s_.room; }
+  double end(double v) const noexcept {
+    const JerkStop stop(v, slope_at(v), s_.jerk, s_.braking);
+    return v + (s_.longest > 0.0 ? stop.integral() : stop.distance()) - s_.room;
+  }
 
   // The next sample of the fastest way to the steady velocity v, with the best slope that the jerk limit allows.
   double settling(double v) const noexcept {
     const double j = s_.jerk, cap = s_.settling;
     const double excess = s_.v - v, slope = std::copysign(std::sqrt(2.0 * j * std::abs(excess)), -excess);
-    const double steepest = std::max(-cap, s_.change - 0.5 * j), flattest = std::min(cap, s_.change + 0.5 * j);
+    const double half = 0.5 * j * s_.last;  // the slope is of the time between the last cycle and the coming one
+    const double steepest = std::max(-cap, s_.change - half), flattest = std::min(cap, s_.change + half);
     double next, next_slope;
     JerkStop(excess, std::max(steepest, std::min(flattest, slope)), j, cap).sample(1.0, next, next_slope);
     return v + next;
   }
 
   void reach_of_the_motor() noexcept {
-    const bool by_jerk = s_.change + s_.jerk < s_.acceleration;
-    const double bound = std::max(s_.next, s_.v + (by_jerk ? s_.change + s_.jerk : s_.acceleration));
+    const double by_change = s_.change + s_.jerk * (0.5 + 0.5 * s_.last);
+    const bool by_jerk = by_change < s_.acceleration;
+    const double bound = std::max(s_.next, s_.v + (by_jerk ? by_change : s_.acceleration));
     out_ = {bound, bound, by_jerk ? LimitKind::Jerk : LimitKind::Acceleration, false};
   }
 
@@ -103,14 +108,15 @@ class Upper {
     const double j = s_.jerk, braking = s_.braking;
     const double slope = std::max(0.0, slope_at(out_.bound)), fast = out_.bound + 0.5 * slope * slope / j;
     if (fast <= 0.0) return s_.room >= 0.0;
-    return out_.bound + fast * (1.0 + slope / j + 0.5 * (fast / braking + braking / j)) <= s_.room;
+    const double rising = s_.longest * 0.5 * slope * slope / j;
+    return out_.bound + rising + fast * (1.0 + slope / j + 0.5 * (fast / braking + braking / j)) <= s_.room;
   }
 
   void hold_position() noexcept {
     const double beyond = overshoot(out_.bound);
     if (beyond <= 0.0) return;
     out_.kind = LimitKind::Position;
-    const double next_beyond = s_.next + JerkStop(s_.next, s_.next_slope, s_.jerk, s_.braking).rise() - s_.room;
+    const double next_beyond = highest_way(s_.next, s_.next_slope, s_.jerk, s_.braking, s_.longest) - s_.room;
     if (next_beyond <= 0.0) {
       stop_inside(beyond, next_beyond);
     } else {
@@ -144,6 +150,12 @@ class Upper {
 };
 
 }  // namespace
+
+double highest_way(double v, double slope, double jerk, double braking, double longest) noexcept {
+  const JerkStop stop(v, slope, jerk, braking);
+  if (!(longest > 0.0)) return v + stop.rise();
+  return v + stop.highest_integral() + longest * square(std::max(0.0, slope)) / (2.0 * jerk);
+}
 
 JerkBound upper_bound(const JerkState& state) noexcept { return Upper(state).find(); }
 

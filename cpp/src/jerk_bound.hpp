@@ -18,6 +18,8 @@ struct JerkState {
   double slack;             // of the room: a smaller excess is rounding
   double velocity, acceleration, braking, jerk, recovery;
   double settling;  // the slope limit of a way to a steady velocity
+  double last = 1.0;     // the time of the last cycle [cycles]
+  double longest = 0.0;  // that of the longest cycle to come, where cycles are not even; 0: all cycles are even
 };
 
 struct JerkBound {
@@ -28,6 +30,10 @@ struct JerkBound {
 };
 
 JerkBound upper_bound(const JerkState& state) noexcept;
+
+// The highest position, from now on, of a cycle with the velocity v and the stop after it, whose slope is given. Where
+// cycles are not even: for any times of the cycles after it up to `longest`, see limits.hpp.
+double highest_way(double v, double slope, double jerk, double braking, double longest) noexcept;
 
 // The line of choices (limits.hpp): the slope with which v is chosen after v_k. The line goes through the next sample
 // of the stop that is kept, else as near to this sample as |slope − (v − v_k)| ≤ j/2 allows, which makes stopping as

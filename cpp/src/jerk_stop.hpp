@@ -57,12 +57,24 @@ class JerkStop {
   double rise() const noexcept {
     if (sign_ > 0.0) return std::max(0.0, distance());
     if (v_ >= 0.0) return 0.0;
-    // The motion turns round in the first phase.
-    const double turn = -2.0 * v_ / (a_ + std::sqrt(std::max(0.0, a_ * a_ + 2.0 * j_ * v_)));
-    return std::max(0.0, -sum_falling(floor_of(std::min(turn, falling_))));
+    return std::max(0.0, -sum_falling(floor_of(std::min(turn(), falling_))));
+  }
+
+  // ∫ v dt to the end of the stop, and the largest of 0 and ∫ v dt to any time.
+  double integral() const noexcept {
+    const double t = steady_ - falling_, left = end_ - steady_;
+    const double steady = t * (velocity_falling(falling_) - 0.5 * p_ * t);
+    return sign_ * (integral_falling(falling_) + steady + j_ * left * left * left * (1.0 / 6.0));
+  }
+  double highest_integral() const noexcept {
+    if (sign_ > 0.0) return std::max(0.0, integral());
+    return v_ >= 0.0 ? 0.0 : std::max(0.0, -integral_falling(std::min(turn(), falling_)));
   }
 
  private:
+  // When a motion turns round that starts with v < 0: in the first phase.
+  double turn() const noexcept { return -2.0 * v_ / (a_ + std::sqrt(std::max(0.0, a_ * a_ + 2.0 * j_ * v_))); }
+  double integral_falling(double t) const noexcept { return t * (v_ + t * (0.5 * a_ - j_ * t * (1.0 / 6.0))); }
   double velocity_falling(double t) const noexcept { return v_ + t * (a_ - 0.5 * j_ * t); }
   double sum_falling(double n) const noexcept {
     return n * (v_ + 0.5 * (n + 1.0) * (a_ - j_ * (2.0 * n + 1.0) * (1.0 / 6.0)));

@@ -10,20 +10,20 @@
 #include "finite.hpp"
 #include "jerk_bound.hpp"
 #include "jerk_stop.hpp"
+#include "limits_window.hpp"
 #include "message.hpp"
 #include "numbers.hpp"
 
 namespace sigmaik {
 namespace {
 
+using detail::braking;
+using detail::fastest_after;
 using detail::kInfinity;
 using detail::kLimitTolerance;
 using detail::require;
-// Relative reserve of the planned deceleration: the plan can then make up for rounding on the way.
-constexpr double kBrakingReserve = 1e-10;
+using detail::slowest_after;
 constexpr double kSnap = 1e-12;  // [1 + rad or m] rounding of positions as they add up
-
-double braking(double acceleration) noexcept { return acceleration * (1.0 - kBrakingReserve); }
 
 // D⁻¹(d) of limits.hpp, d [velocities × cycles] ≥ 0, a = A dt.
 double fastest_before(double d, double a) noexcept {
@@ -32,14 +32,6 @@ double fastest_before(double d, double a) noexcept {
   // At the corners of D⁻¹ its two lines agree, so a wrongly rounded N does no harm.
   return d / (steps + 1.0) + 0.5 * a * steps;
 }
-
-// The lowest velocity after v ≥ 0 in a cycle; a = A dt, b = B dt. Across zero the smaller limit holds.
-double slowest_after(double v, double a, double b) noexcept {
-  return std::max(v - b, std::min(0.0, v - std::min(a, b)));
-}
-
-// The highest velocity after v ≥ 0 in a cycle: at zero the change is the same as that of slowest_after().
-double fastest_after(double v, double a, double b) noexcept { return v + (b >= a ? a : std::min(a, b + v)); }
 
 // The velocity from which a joint can stop within d, under |v'| ≤ a and |v''| ≤ j, from no acceleration to none: D⁻¹ of
 // LimitTracker::arrival(). In velocities and cycles.
@@ -55,25 +47,6 @@ constexpr double kArrivalAcceleration = 0.5, kArrivalJerk = 0.125;
 
 }  // namespace
 
-// The velocities that one joint may choose, and the limits that form the ends.
-struct LimitTracker::Window {
-  double lower, upper;
-  LimitKind lower_kind, upper_kind;
-
-  // Narrows the window to [low, high], low ≤ high. Where the two do not intersect, the end nearest to [low, high] is
-  // left: each limit gives way to the limits before it.
-  void narrow(double low, double high, LimitKind kind) noexcept {
-    if (high < upper) {
-      upper = std::max(high, lower);
-      upper_kind = kind;
-    }
-    if (low > lower) {
-      lower = std::min(low, upper);
-      lower_kind = kind;
-    }
-  }
-};
-
 const char* to_string(LimitKind kind) noexcept {
   switch (kind) {
     case LimitKind::None: return "none";
@@ -86,7 +59,7 @@ const char* to_string(LimitKind kind) noexcept {
 }
 
 LimitTracker::LimitTracker(const JointLimits& limits, double dt, const LimitOptions& options)
-    : options_(options), dt_(dt), per_dt_(1.0 / dt), n_(static_cast<int>(limits.lower.size())) {
+    : options_(options), dt_(dt), cycle_(dt), per_dt_(1.0 / dt), n_(static_cast<int>(limits.lower.size())) {
   require(dt > 0.0 && std::isfinite(dt), "dt = ", dt, " s must be above 0 and finite");
   require(options.recovery_speed > 0.0 && options.recovery_speed <= 1.0, "recovery_speed = ", options.recovery_speed,
           " must be above 0 and at most 1");
@@ -105,7 +78,7 @@ LimitTracker::LimitTracker(const JointLimits& limits, double dt, const LimitOpti
   }
   // Beyond n_ are numbers that are harmless in every operation, because blocks of a fixed size are read and written.
   lower_.fill(-1.0);
-  for (Numbers* x : {&upper_, &velocity_, &acceleration_, &braking_, &jerk_, &recovery_}) x->fill(1.0);
+  for (Numbers* x : {&upper_, &velocity_, &recovery_, &most_acceleration_, &most_braking_, &most_jerk_}) x->fill(1.0);
   for (int i = 0; i < n_; ++i) {
     require(limits.lower[i] <= limits.upper[i], "joint ", i, ": lower = ", limits.lower[i],
             " is not below upper = ", limits.upper[i]);
@@ -118,13 +91,14 @@ LimitTracker::LimitTracker(const JointLimits& limits, double dt, const LimitOpti
     velocity_[at] = options.velocity ? limits.velocity[i] : kInfinity;
     const double acceleration = limits.acceleration[i] < kInfinity ? limits.acceleration[i]
                                                                    : options.assumed_acceleration;
-    acceleration_[at] = options.acceleration ? acceleration * dt : kInfinity;
-    braking_[at] = options.acceleration && deceleration[i] < kInfinity ? deceleration[i] * dt : acceleration_[at];
-    jerk_[at] = options.jerk ? limits.jerk[i] * dt * dt : kInfinity;
+    most_acceleration_[at] = options.acceleration ? acceleration : kInfinity;
+    most_braking_[at] = options.acceleration && deceleration[i] < kInfinity ? deceleration[i] : most_acceleration_[at];
+    most_jerk_[at] = options.jerk ? limits.jerk[i] : kInfinity;
     recovery_[at] = options.recovery_speed * limits.velocity[i];
-    if (jerk_[at] < kInfinity) with_jerk_ |= 1u << i;
-    if (braking_[at] != acceleration_[at]) uneven_ |= 1u << i;
+    if (most_jerk_[at] < kInfinity) with_jerk_ |= 1u << i;
+    if (most_braking_[at] != most_acceleration_[at]) unequal_ |= 1u << i;
   }
+  scale_to(dt);
   settling_time_ = longest_settling();
 }
 
@@ -135,6 +109,10 @@ void LimitTracker::reset(const JointRef& q, const JointRef& qdot, const JointRef
   require(qdot.allFinite(), "qdot has an entry that is not finite");
   require(qddot.size() == 0 || qddot.size() == n_, "qddot has ", qddot.size(), " entries, the limits ", n_, " joints");
   require(qddot.allFinite(), "qddot has an entry that is not finite");
+  scale_to(dt_);
+  last_ = 1.0;
+  uneven_ = false;
+  changing_ = 0;
   std::array<JerkMemory, kMaxJoints> states{};
   for (int i = 0; i < n_; ++i) {
     const auto at = static_cast<std::size_t>(i);
@@ -173,6 +151,10 @@ void LimitTracker::continue_from(const LimitTracker& other) {
   require(other.dt_ == dt_, "the other tracker has dt = ", other.dt_, " s, this one ", dt_);
   if (other.q_.size() == 0) return;
   clear();
+  scale_to(other.cycle_);
+  last_ = other.last_;
+  uneven_ = other.uneven_;
+  changing_ = other.changing_;
   q_ = other.q_;
   v_ = other.v_;
   jerk_states_ = other.jerk_states_;
@@ -193,6 +175,7 @@ bool LimitTracker::advance(JointVector& qdot) noexcept {
     changed = true;
   }
   changed = (n_ <= 8 ? move<8>(qdot) : move<kMaxJoints>(qdot)) || changed;
+  last_ = 1.0;
   update();
   return changed;
 }
@@ -217,7 +200,7 @@ bool LimitTracker::move(JointVector& qdot) noexcept {
     state.slope = detail::slope_of(v[i], last[i], state.next, state.next_slope, jerk_[at]);
   }
   const Block from = q;
-  q += dt_ * v;
+  q += cycle_ * v;
   last = v;
   if ((q > Eigen::Map<const Block>(upper_.data())).any() || (q < Eigen::Map<const Block>(lower_.data())).any()) {
     for (int i = 0; i < n_; ++i) {
@@ -248,7 +231,7 @@ unsigned LimitTracker::survey() noexcept {
   Eigen::Map<Block>(bounds_.lower.data()) = lower;
   Eigen::Map<Block>(bounds_.upper.data()) = upper;
   Eigen::Map<Block>(stop_.data()) = lower.max(0.0).min(upper);
-  unsigned more = with_jerk_ | uneven_;
+  unsigned more = with_jerk_ | unequal_;
   for (int i = 0; i < n_; ++i) {
     const auto at = static_cast<std::size_t>(i);
     if (!(spare[i] >= 0.0 && slow[i] >= 0.0)) more |= 1u << i;
@@ -260,14 +243,14 @@ unsigned LimitTracker::survey() noexcept {
 
 void LimitTracker::update() noexcept {
   outside_ = recovering_ = 0;
-  unsigned more = n_ <= 8 ? survey<8>() : survey<kMaxJoints>();
+  unsigned more = uneven_ ? (1u << n_) - 1u : n_ <= 8 ? survey<8>() : survey<kMaxJoints>();
   for (; more != 0; more &= more - 1) {
     const int i = std::countr_zero(more);
     const auto at = static_cast<std::size_t>(i);
     const bool has_jerk = (with_jerk_ >> i & 1u) != 0;
     if (q_[i] < lower_[at] || q_[i] > upper_[at]) outside_ |= static_cast<std::uint16_t>(1u << i);
     bool broken = false;
-    put(i, has_jerk ? jerk_window(i, broken) : window(i, broken), bounds_);
+    put(i, has_jerk ? jerk_window(i, broken) : uneven_ ? uneven_window(i, broken) : window(i, broken), bounds_);
     stop_[i] = std::clamp(has_jerk ? jerk_states_[at].next : 0.0, bounds_.lower[i], bounds_.upper[i]);
     if (broken) recovering_ |= static_cast<std::uint16_t>(1u << i);
   }
@@ -289,8 +272,8 @@ double LimitTracker::recovery(int i, double outside) const noexcept {
 
 double LimitTracker::towards(int i, double room) const noexcept {
   const double a = braking(braking_[static_cast<std::size_t>(i)]);
-  if (room >= 0.0) return fastest_before(room, a);
-  return -std::min(fastest_before(-room, a), recovery(i, -room * dt_));
+  const double fastest = uneven_ ? towards_unevenly(std::abs(room), a) : fastest_before(std::abs(room), a);
+  return room >= 0.0 ? fastest : -std::min(fastest, recovery(i, -room * cycle_));
 }
 
 VelocityBounds LimitTracker::heading() const noexcept {
@@ -361,8 +344,10 @@ JointVector LimitTracker::approach(const JointVector& wanted) const noexcept {
 double LimitTracker::slope_limit(int i, bool upwards) const noexcept {
   const auto at = static_cast<std::size_t>(i);
   const double a = acceleration_[at], b = braking_[at];
-  if ((uneven_ >> i & 1u) == 0) return a;
-  const double least = std::min(a, b), speed = std::abs(v_[i]), j = jerk_[at];
+  if ((unequal_ >> i & 1u) == 0) return a;
+  const double least = std::min(a, b);
+  if (uneven_) return least;  // the changes below can fall in time only where cycles are even
+  const double speed = std::abs(v_[i]), j = jerk_[at];
   const bool brakes = upwards ? v_[i] < 0.0 : v_[i] > 0.0;
   if (!brakes) return std::min(a, std::sqrt(least * least + 2.0 * j * speed));
   const double slope = std::sqrt(least * (least + j) + 0.25 * j * j + 2.0 * j * std::max(0.0, speed - least)) - 0.5 * j;
@@ -373,7 +358,7 @@ double LimitTracker::slope_limit(int i, bool upwards) const noexcept {
 double LimitTracker::change_limit(int i, double wanted) const noexcept {
   const auto at = static_cast<std::size_t>(i);
   const double v = v_[i], a = acceleration_[at], b = braking_[at];
-  if ((uneven_ >> i & 1u) == 0) return a;
+  if ((unequal_ >> i & 1u) == 0) return a;
   const double from = std::abs(v), to = std::abs(wanted), size = std::abs(wanted - v);
   double mean = to >= from ? a : b;
   if (v * wanted < 0.0) mean = size / (from / b + to / a);
@@ -456,14 +441,18 @@ LimitTracker::Window LimitTracker::jerk_window(int i, bool& broken) noexcept {
   JerkMemory& s = jerk_states_[at];
   const double v = v_[i], above = room_above(i), below = room_below(i);
   const double brake = braking(braking_[at]), settling = std::min(acceleration_[at], braking_[at]);
-  detail::JerkStop(v, s.slope, jerk_[at], brake).sample(1.0, s.next, s.next_slope);
+  const detail::JerkStop stop(v, s.slope, jerk_[at], brake);
+  stop.sample(1.0, s.next, s.next_slope);
+  const double longest = uneven_ ? kLongestCycle * dt_ * per_dt_ : 0.0;
+  if ((changing_ >> i & 1u) != 0) keep_even_stop(i);
   const double slack = kLimitTolerance * (1.0 + std::abs(q_[i])) * per_dt_;
-  const double back = recovery(i, std::max({0.0, -above, -below}) * dt_);
+  const double back = recovery(i, std::max({0.0, -above, -below}) * cycle_);
   const detail::JerkBound up = detail::upper_bound({v, s.change, s.next, s.next_slope, above, slack, velocity_[at],
-                                                    slope_limit(i, true), brake, jerk_[at], back, settling});
+                                                    slope_limit(i, true), brake, jerk_[at], back, settling, last_,
+                                                    longest});
   const detail::JerkBound down = detail::upper_bound({-v, -s.change, -s.next, -s.next_slope, below, slack,
                                                       velocity_[at], slope_limit(i, false), brake, jerk_[at], back,
-                                                      settling});
+                                                      settling, last_, longest});
   // The way back from one limit does not break another.
   Window window{std::min(-down.bound, up.safe), std::max(up.bound, -down.safe), down.kind, up.kind};
   if (window.lower > window.upper) {

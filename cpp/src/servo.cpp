@@ -92,6 +92,8 @@ Servo::Servo(Chain chain, const Method& method, const ServoOptions& options)
   check_finite("soft_start", options.soft_start, true, "s");
   check_finite("posture_gain", options.posture_gain, true, "1/s");
   check("posture_max_speed", options.posture_max_speed, false, "rad/s");
+  check("max_tool_speed", options.max_tool_speed, false, "m/s");
+  require(options.speed_points.allFinite(), "speed_points has an entry that is not finite");
   if (options.posture.size() != 0) check_joints("posture", options.posture, chain_);
   for (std::size_t i = 0; i < 6; ++i) {
     require(!options.exact[i] || options.task.mask[i], "exact asks for row ", i, ", which the task's mask leaves out");
@@ -141,8 +143,8 @@ bool Servo::measure(const JointRef& q, const JointRef& qdot) noexcept {
   if (!measured_) {
     following_error_ = q - tracker_.q();
   } else {
-    if (qdot.size() != 0) following_error_ += options_.dt * (qdot - tracker_.qdot());
-    following_error_ += std::min(1.0, options_.dt / kMeasuringTime) * (q - tracker_.q() - following_error_);
+    if (qdot.size() != 0) following_error_ += cycle() * (qdot - tracker_.qdot());
+    following_error_ += std::min(1.0, cycle() / kMeasuringTime) * (q - tracker_.q() - following_error_);
   }
   measured_ = true;
   // The arm was moved while the reference rested: this is no swing, and no creep.
@@ -215,16 +217,27 @@ JointVector Servo::posture_velocity() const noexcept {
   return velocity.size() == 0 ? away : JointVector(velocity + away);
 }
 
+// The time of the cycle. Outside the range: the nearest time in the range, and false.
+bool Servo::begin_cycle(std::optional<double> dt) noexcept {
+  if (!dt) return tracker_.set_cycle(options_.dt);
+  if (tracker_.set_cycle(*dt)) return true;
+  const double nearest = *dt > options_.dt ? kLongestCycle : *dt < options_.dt ? kShortestCycle : 1.0;  // 1 for NaN
+  tracker_.set_cycle(nearest * options_.dt);
+  return false;
+}
+
 ServoStep Servo::stop(Status status) noexcept {
   ServoStep step;
   step.status = status;
   step.qdot = tracker_.stop();
   step.scale = 0.0;
+  if (holds_tool_speed() && tracker_.q().size() != 0) hold_tool_speed(step);
   take(step, false);
   return step;
 }
 
-ServoStep Servo::update(const Pose& asked, const Twist& feedforward) noexcept {
+ServoStep Servo::update(const Pose& asked, const Twist& feedforward, std::optional<double> dt) noexcept {
+  if (!begin_cycle(dt)) return stop(Status::BadInput);
   if (!is_pose(asked.matrix()) || !detail::finite(feedforward)) return stop(Status::BadInput);
   if (is_rough(asked)) ++rough_targets_;
   const Pose target = nearest_pose(asked);
@@ -232,8 +245,10 @@ ServoStep Servo::update(const Pose& asked, const Twist& feedforward) noexcept {
   Twist twist = error;
   detail::shorten(twist.head<3>(), max_linear_error_);
   detail::shorten(twist.tail<3>(), options_.max_angular_error);
-  twist.head<3>() *= options_.gain_linear;
-  twist.tail<3>() *= options_.gain_angular;
+  // A cycle longer than dt does not take the tip beyond its target.
+  const auto gain_of = [this](double gain) { return std::min(gain, std::max(1.0, gain * options_.dt) / cycle()); };
+  twist.head<3>() *= gain_of(options_.gain_linear);
+  twist.tail<3>() *= gain_of(options_.gain_angular);
   twist += feedforward;
   const JointVector* goal = guide_ && tracker_.q().size() != 0 ? ask_guide(target, error) : nullptr;
   ServoStep step = resolve(twist, &feedforward, true, goal);
@@ -256,19 +271,21 @@ void Servo::watch(const Pose& target, ServoStep& step) noexcept {
   // Without limits that delay the command, a motion that does not settle is the rule's own.
   if (!tracker_.delays()) return;
   count_reversals(step.qdot);
-  rested_ += options_.dt;
+  rested_ += cycle();
   if (rested_ < settling_time()) return;
   step.not_settling = !tracker_.resting();
 }
 
-ServoStep Servo::update_twist(const Twist& twist) noexcept {
+ServoStep Servo::update_twist(const Twist& twist, std::optional<double> dt) noexcept {
+  if (!begin_cycle(dt)) return stop(Status::BadInput);
   if (!detail::finite(twist)) return stop(Status::BadInput);
   expect_motion();
   forget_guide();
   return resolve(twist, nullptr, qdot_start_.size() != 0 && !qdot_start_.isZero(0.0), nullptr);
 }
 
-ServoStep Servo::update_twist(const Twist& twist, Frame frame, const Eigen::Vector3d& point) noexcept {
+ServoStep Servo::update_twist(const Twist& twist, Frame frame, const Eigen::Vector3d& point,
+                              std::optional<double> dt) noexcept {
   const Pose& tip = measured_ ? measured_tip_ : state_.tip;
   Twist at_tip = twist;
   Eigen::Vector3d from_tip = point - tip.translation();
@@ -278,7 +295,7 @@ ServoStep Servo::update_twist(const Twist& twist, Frame frame, const Eigen::Vect
     from_tip = tip.linear() * point;
   }
   at_tip.head<3>() -= at_tip.tail<3>().cross(from_tip);
-  return update_twist(at_tip);
+  return update_twist(at_tip, dt);
 }
 
 // A slice of the guide's work. Returns where the joints go; null: the servo goes its own way.
@@ -321,12 +338,13 @@ ServoStep Servo::resolve(const Twist& twist, const Twist* feedforward, bool fade
   if (goal != nullptr) {
     lead(*goal, step);
     rule = false;
-  } else if (tracker_.has_jerk() || !tracker_.bounds().contain(step.qdot)) {
+  } else if (tracker_.has_jerk() || !tracker_.bounds().contain(step.qdot) ||
+             (holds_tool_speed() && !(tool_speed_part(step.qdot) <= 1.0))) {
     limit(step);
     rule = false;
   }
   // Without velocity limits, a huge twist can move the arm beyond the range of the numbers.
-  if (!detail::finite(tracker_.q() + options_.dt * step.qdot) || !detail::finite(step.achieved_twist)) {
+  if (!detail::finite(tracker_.q() + cycle() * step.qdot) || !detail::finite(step.achieved_twist)) {
     return stop(Status::BadInput);
   }
   take(step, rule);
@@ -337,7 +355,7 @@ ServoStep Servo::resolve(const Twist& twist, const Twist* feedforward, bool fade
 // changed.
 bool Servo::fade_in(JointVector& qdot, bool fade) noexcept {
   if (fade_ >= 1.0) return false;
-  fade_ = options_.soft_start > 0.0 ? std::min(1.0, fade_ + options_.dt / options_.soft_start) : 1.0;
+  fade_ = options_.soft_start > 0.0 ? std::min(1.0, fade_ + cycle() / options_.soft_start) : 1.0;
   if (!fade || fade_ >= 1.0) return false;
   qdot = fade_ * qdot + (1.0 - fade_) * qdot_start_;
   return true;
@@ -350,6 +368,7 @@ void Servo::take(ServoStep& step, bool achieved) noexcept {
     step.status = Status::BadInput;
     return;
   }
+  if (holds_tool_speed()) step.tool_speed = tool_speed(step.qdot);
   const bool changed = tracker_.advance(step.qdot);
   step.q = tracker_.q();
   if (!achieved || changed) {

@@ -63,8 +63,11 @@ JointVector furthest(const JointVector& from, const JointVector& to, const Veloc
 void Servo::limit(ServoStep& step) noexcept {
   const JointVector asked = step.qdot;
   slow_down(step);
+  if (holds_tool_speed()) slow_tool(step);
   head(step);
+  if (holds_tool_speed()) slow_tool(step);  // joints that take over may move an elbow
   approach(step, options_.on_limit == OnLimit::Redistribute);
+  if (holds_tool_speed()) hold_tool_speed(step);
   judge(asked, step);
 }
 
@@ -132,7 +135,9 @@ void Servo::lead(const JointVector& goal, ServoStep& step) noexcept {
   if (twist.head<3>().norm() * part > linear) part = linear / twist.head<3>().norm();
   if (twist.tail<3>().norm() * part > angular) part = angular / twist.tail<3>().norm();
   step.qdot *= std::min(1.0, fade_) * part;
+  if (holds_tool_speed()) slow_tool(step);
   approach(step, false);
+  if (holds_tool_speed()) hold_tool_speed(step);
   judge(asked, step);
 }
 

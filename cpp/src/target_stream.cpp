@@ -44,6 +44,7 @@ const char* to_string(SampleStatus status) noexcept {
     case SampleStatus::Outlier: return "outlier";
     case SampleStatus::OutOfOrder: return "out of order";
     case SampleStatus::Invalid: return "invalid";
+    case SampleStatus::Ahead: return "ahead";
   }
   return "?";
 }
@@ -67,6 +68,8 @@ TargetStream::TargetStream(const TargetStreamOptions& options) : options_(option
 void TargetStream::reset() noexcept {
   counts_ = {};
   count_ = candidates_ = 0;
+  shift_ = period_ = 0.0;
+  stepped_ = other_clock_ = called_ = false;
   last_ = {};
   placed_ = timed_ = false;
 }
@@ -93,20 +96,28 @@ SampleStatus TargetStream::push(double time, const Pose& pose) noexcept {
     return SampleStatus::Invalid;
   }
   Sample next;
-  next.time = time;
+  next.time = time - shift_;
   next.pose = nearest_pose(pose);
   if (is_rough(pose)) ++counts_.rough;
 
+  if (of_another_clock(next.time)) {
+    const bool ahead = next.time > time_;
+    ++(ahead ? counts_.ahead : counts_.out_of_order);
+    return refuse(next, ahead ? SampleStatus::Ahead : SampleStatus::OutOfOrder, time);
+  }
   if (count_ == 0) {
+    candidates_ = 0;
+    stepped_ = false;
     start(next);
     ++counts_.accepted;
     return SampleStatus::Accepted;
   }
   const Sample& newest = sample(count_ - 1);
-  if (time > newest.time && reachable(newest, next)) {
+  if (next.time > newest.time && reachable(newest, next)) {
     candidates_ = 0;
+    stepped_ = false;
     ++counts_.accepted;
-    if (time - newest.time > options_.timeout) {  // samples before a gap do not predict the motion after the gap
+    if (next.time - newest.time > options_.timeout) {  // samples before a gap do not predict the motion after the gap
       start(next);
     } else {
       if (options_.mode == StreamMode::Predict) correct(next);
@@ -114,21 +125,62 @@ SampleStatus TargetStream::push(double time, const Pose& pose) noexcept {
     }
     return SampleStatus::Accepted;
   }
-  const SampleStatus refused = time > newest.time ? SampleStatus::Outlier : SampleStatus::OutOfOrder;
+  const SampleStatus refused = next.time > newest.time ? SampleStatus::Outlier : SampleStatus::OutOfOrder;
   ++(refused == SampleStatus::Outlier ? counts_.outliers : counts_.out_of_order);
-  if (time == newest.time) return refused;  // a repeated sample is no evidence of a new place
-  const bool agrees = candidates_ > 0 && time > candidate_.time && reachable(candidate_, next);
+  if (next.time == newest.time) return refused;  // a repeated sample is no evidence of a new place
+  return refuse(next, refused, time);
+}
+
+// Refuses a sample, unless so many agree with it that the target is at another place, or the stamps of another clock.
+SampleStatus TargetStream::refuse(const Sample& next, SampleStatus why, double stamp) noexcept {
+  const bool clock = of_another_clock(next.time);
+  bool agrees = candidates_ > 0 && next.time > candidate_.time && reachable(candidate_, next) && clock == other_clock_;
+  if (clock && agrees) agrees = next.time - candidate_.time <= options_.timeout && keeps_pace(next.time);
   candidates_ = agrees ? candidates_ + 1 : 1;
   candidate_ = next;
-  if (candidates_ < options_.relocate) return refused;
+  other_clock_ = clock;
+  if (candidates_ == 1) {
+    first_stamp_ = next.time;
+    first_clock_ = time_;
+  }
+  const bool long_enough = candidates_ >= 3 || (candidates_ == 2 && next.time - first_stamp_ >= 0.5 * options_.timeout);
+  if (clock ? !long_enough : candidates_ < options_.relocate) return why;
   candidates_ = 0;
-  start(next);
+  other_clock_ = false;
+  Sample accepted = next;
+  if (clock) {
+    shift_ = std::abs(stamp - time_) <= options_.timeout ? 0.0 : stamp - time_;
+    accepted.time = stamp - shift_;
+    stepped_ = false;
+    ++counts_.clock_steps;
+  }
+  start(accepted);
   ++counts_.accepted;
   ++counts_.relocated;
   return SampleStatus::Relocated;
 }
 
+// Whether a stamp is so far from the clock of at() that this clock or that of the stamps has stepped. A stamp that is
+// late without a step is that of a late sample.
+bool TargetStream::of_another_clock(double time) const noexcept {
+  if (!timed_) return false;
+  const double newest = count_ > 0 ? sample(count_ - 1).time : 0.0, far = options_.timeout;
+  // at() may have paused while samples came.
+  if (time > time_ + far) return called_ || count_ == 0 || time > newest + far || (other_clock_ && candidates_ > 0);
+  if (time >= time_ - far) return false;
+  const bool set_right = shift_ != 0.0 && std::abs(time + shift_ - time_) <= far;
+  return stepped_ || set_right || (count_ > 0 && time < newest - far) || (other_clock_ && candidates_ > 0);
+}
+
+// Whether the candidates are as far apart as the calls of at(): a burst of old samples is not.
+bool TargetStream::keeps_pace(double time) const noexcept {
+  constexpr double kReading = 5e-3;  // [s] from the last call of at() to a sample
+  const double stamps = time - first_stamp_, clock = time_ - first_clock_;
+  return std::abs(stamps - clock) <= 0.5 * stamps + kReading + period_;
+}
+
 void TargetStream::start(const Sample& next) noexcept {
+  called_ = false;
   first_ = 0;
   count_ = 1;
   history_[0] = next;
@@ -139,6 +191,7 @@ void TargetStream::start(const Sample& next) noexcept {
 }
 
 void TargetStream::extend(const Sample& next) noexcept {
+  called_ = false;
   int at = 0;
   if (options_.mode == StreamMode::Interpolate) {
     // Decimate a fast sensor so that the ring still covers `latency`; always keep the newest sample.
@@ -256,12 +309,54 @@ StreamStatus TargetStream::status(double time) const noexcept {
 
 // Output -------------------------------------------------------------------------------------------------------------
 
+// Whether a clock has stepped, see the header. What belongs to the old clock is forgotten.
+bool TargetStream::step_of_clock(double time) noexcept {
+  const double newest = count_ > 0 ? sample(count_ - 1).time : time;
+  const bool back = timed_ && time < time_;
+  const bool forth = timed_ && time - time_ > std::max(options_.timeout, 4.0 * period_);
+  const bool future = newest > time + options_.timeout;
+  if (!back && !forth && !future) return false;
+  if (future || (back && newest > time)) count_ = candidates_ = 0;
+  if (back) candidates_ = 0;
+  stepped_ = forth;
+  ++counts_.clock_steps;
+  return true;
+}
+
+// The target stops where it is.
+void TargetStream::hold_still() noexcept {
+  last_.twist.setZero();
+  acceleration_.setZero();
+  if (last_.status != StreamStatus::Waiting) last_.status = StreamStatus::Stale;
+}
+
 Target TargetStream::at(double time) noexcept {
-  if (!std::isfinite(time) || (timed_ && time < time_)) return last_;
+  constexpr double kReading = 5e-3;  // [s] two threads may read the clock in turn
+  constexpr double kSlowest = 1.0;   // [s] a loop may be as slow, and a second step is seen
+  if (!std::isfinite(time)) {
+    Target held = last_;
+    held.twist.setZero();
+    if (held.status != StreamStatus::Waiting) held.status = StreamStatus::Stale;
+    return held;
+  }
+  if (timed_ && time < time_ && time >= time_ - kReading) return last_;
+  if (step_of_clock(time)) {
+    if (count_ > 0 && !placed_) place(motion(time));
+    if (count_ > 0) last_.status = StreamStatus::Stale;
+    hold_still();
+    if (count_ > 0) last_.age = std::max(0.0, time - sample(count_ - 1).time);
+    period_ = timed_ ? std::clamp(time - time_, 0.0, kSlowest) : 0.0;
+    time_ = time;
+    timed_ = true;
+    return last_;
+  }
   const double dt = timed_ ? time - time_ : 0.0;
+  called_ = true;
+  period_ = dt;
+  if (count_ == 0 && placed_ && last_.status == StreamStatus::Stale) last_.age += dt;
   if (count_ > 0) {
     last_.status = status(time);
-    last_.age = time - sample(count_ - 1).time;
+    last_.age = std::max(0.0, time - sample(count_ - 1).time);
     if (!placed_) {
       place(motion(time));
     } else if (dt > 0.0) {

@@ -50,6 +50,22 @@
 /// A dt and a + J dt² allow. All joints are in proportion to c, with the limits of the joint that needs the most time;
 /// a joint that would pass its wanted velocity brakes as hard as its own limits allow.
 ///
+/// *A clock that is not even* (set_cycle()). With h_k for the time of cycle k, q_k = q_{k−1} + v_k h_k, and the limits
+/// hold for q_k, v_k, a_k = (v_k − v_{k−1})/h_k and the jerk (a_k − a_{k−1})/m_k, where m_k = (h_k + h_{k−1})/2 is the time
+/// between the middles of two cycles. Without a jerk limit (v_k − v_{k−1})/m_k is within the acceleration limit, too:
+/// |v_k − v_{k−1}| ≤ A e with e = min(h_k, m_k) ≥ h_k/2. From the first cycle whose time is not dt, until reset(), the
+/// bounds are made for any times of the cycles to come.
+///   - Without a jerk limit: v h + Φ(v) ≤ room with Φ(v) = v²/A, the way of half the acceleration. This can be held for
+///     ever: v' = max(v − A e, 0) has v' h + Φ(v') ≤ Φ(v), because v² − v'² = A e (2v' + A e) and 2e ≥ h.
+///   - With a jerk limit the way of the stop is ∫ v dt + H max(s, 0)²/2J, with the longest cycle H, in place of the sum
+///     of its samples. A sum of samples at the ends of cycles is less than the integral while v falls, and more by at
+///     most the longest cycle times the rise s²/2J.
+/// Without a jerk limit a joint that brakes with another limit has B in place of A in Φ. With a jerk limit such a joint
+/// changes its velocity by min(A, B) h at most where it chooses; its stop has B.
+/// At the change from even cycles, a joint may just be braking towards a position limit by the sum of samples, for which
+/// shorter cycles come too late. Such a joint keeps its position limit: until the joint is inside the new bounds, it
+/// brakes by up to A max(h_k, h_{k−1}), with a jerk limit by what a cycle of dt takes.
+///
 /// Where a limit is broken already (reset() outside it, or too fast to stop before it), acceleration and jerk are held
 /// first, because the motors can do no more, then velocity, then position: each of these comes back as fast as the
 /// limits before it allow, and then stays inside. A motion that leaves a limit is never held back. The bounds are
@@ -79,6 +95,12 @@ struct LimitOptions {
   /// joint without a velocity limit covers its way back, or 1 mm or 1 mrad if this is more, in 0.1 s.
   double recovery_speed = 0.1;
 };
+
+/// The time of a cycle may be these parts of dt; see LimitTracker::set_cycle(). A clock that reads two packets at once
+/// makes cycles of nearly no time, in which no controller acts. After 20 cycles without a command the controllers of
+/// arms stop by themselves (libfranka: 20 packets), and the gains of a servo are for cycles that are not longer by
+/// orders.
+inline constexpr double kShortestCycle = 0.1, kLongestCycle = 20.0;
 
 /// Kind of limit that forms a bound.
 enum class LimitKind : std::int8_t { None, Position, Velocity, Acceleration, Jerk };
@@ -132,6 +154,16 @@ class LimitTracker {
   /// \throws Error where the number of joints or dt differ
   void continue_from(const LimitTracker& other);
 
+  /// Sets the time h of the coming cycle and of those after it; dt() before the first call and after reset(). See
+  /// limits.hpp, a clock that is not even. Real time.
+  /// \return false, with nothing changed, where h is not in [kShortestCycle, kLongestCycle] dt()
+  bool set_cycle(double h) noexcept;
+
+  /// Whether a cycle since reset() had another time than dt().
+  bool uneven() const noexcept { return uneven_; }
+  /// [s], the time of the coming cycle.
+  double cycle() const noexcept { return cycle_; }
+
   /// Bounds of the coming cycle; empty before reset().
   const VelocityBounds& bounds() const noexcept { return bounds_; }
 
@@ -169,6 +201,8 @@ class LimitTracker {
   /// [rad/s² or m/s²], the deceleration limit of joint i that is held, where it brakes; the acceleration limit where
   /// the model has none.
   double deceleration_limit(int i) const noexcept { return braking_[static_cast<std::size_t>(i)] * per_dt_; }
+  /// [rad/s³ or m/s³], the jerk limit of joint i that is held; infinite where there is none.
+  double jerk_limit(int i) const noexcept { return most_jerk_[static_cast<std::size_t>(i)]; }
   /// Whether acceleration or jerk limits are held: a command then takes time.
   bool delays() const noexcept { return has_jerk() || least_acceleration() < std::numeric_limits<double>::infinity(); }
   /// Whether a joint has a jerk limit that is held.
@@ -214,7 +248,7 @@ class LimitTracker {
  private:
   struct Window;
   // One number for each joint. Velocities keep their unit; all other quantities are in velocities and cycles: positions
-  // [1/dt], changes of velocity in a cycle, and changes of these changes.
+  // [1/h], changes of velocity in a cycle, and changes of these changes, where h is the time of the coming cycle.
   using Numbers = std::array<double, kMaxJoints>;
   // The acceleration of a joint with a jerk limit, and the stop that is kept.
   struct JerkMemory {
@@ -248,9 +282,18 @@ class LimitTracker {
   double change_limit(int i, double wanted) const noexcept;
   Window window(int i, bool& broken) const noexcept;
   Window jerk_window(int i, bool& broken) noexcept;
+  // limits_uneven.cpp
+  void scale_to(double h) noexcept;
+  double towards_unevenly(double room, double acceleration) const noexcept;
+  Window uneven_window(int i, bool& broken) noexcept;
+  void keep_even_stop(int i) noexcept;
 
   LimitOptions options_;
-  double dt_, per_dt_;
+  double dt_;              // [s] as given
+  double cycle_, per_dt_;  // [s] h, [1/s] 1/h
+  double last_ = 1.0;      // [cycles], the time of the last cycle
+  bool uneven_ = false;    // since reset() a cycle had another time than dt
+  std::uint32_t changing_ = 0;  // bit i: joint i still follows bounds of even cycles, see limits.hpp
   int n_ = 0;
   Numbers lower_, upper_;  // [rad or m]
   Numbers velocity_;       // V
@@ -258,9 +301,10 @@ class LimitTracker {
   Numbers braking_;        // B dt
   Numbers jerk_;           // J dt²
   Numbers recovery_;       // [rad/s or m/s], infinite without a velocity limit
+  Numbers most_acceleration_, most_braking_, most_jerk_;  // A, B and J, in s
   double settling_time_ = 0.0;
   std::uint32_t with_jerk_ = 0;  // bit i: joint i has a jerk limit
-  std::uint32_t uneven_ = 0;     // bit i: joint i brakes with another limit than it speeds up
+  std::uint32_t unequal_ = 0;    // bit i: joint i brakes with another limit than it speeds up
   std::array<JerkMemory, kMaxJoints> jerk_states_{};
   JointVector q_, v_, stop_;
   VelocityBounds bounds_;

@@ -59,9 +59,12 @@ enum class OnLimit {
   Scale,  ///< the direction is kept, speed is given up: all joints slow down together
 };
 
+/// [m] Points in the tip's frame, up to 8 columns.
+using ToolPoints = Eigen::Matrix<double, 3, Eigen::Dynamic, kLayout, 3, 8>;
+
 /// Settings of a Servo.
 struct ServoOptions {
-  double dt = 1e-3;  ///< [s] > 0, the time from one update to the next
+  double dt = 1e-3;  ///< [s] > 0, the time from one update to the next, where update() is told no other time
   /// [1/s] ≥ 0, position error to velocity. (JParse's gain_linear is the paper's K, on singular directions alone.) The
   /// gain decides the last part of the way: before it the arm goes as fast as its limits let it stop at the target.
   double gain_linear = 10.0;
@@ -79,6 +82,11 @@ struct ServoOptions {
   AvoidanceOptions avoid{};  ///< adds a velocity away from singularities to the posture's, for redundant arms
   LimitOptions limits{};     ///< which of the chain's limits are held; see limits.hpp
   OnLimit on_limit = OnLimit::Redistribute;  ///< what gives way where a joint limit would be broken
+  /// [m/s] > 0: no checked point of the arm moves faster; infinite: no such limit. The checked points are the tip's
+  /// origin, the origin of each movable joint's link (so the elbow, too), and speed_points. 0.25 is the reduced speed
+  /// of ISO 10218-1. See Servo, tool speed.
+  double max_tool_speed = std::numeric_limits<double>::infinity();
+  ToolPoints speed_points{};  ///< (3, k) [m] further checked points in the tip's frame, such as the end of a tool
   /// Rows (vx, vy, vz, ωx, ωy, ωz), in the task's axes, that come before the others in every cycle: the other rows have
   /// the motion that leaves these rows as they are. As far as a singularity keeps these rows from being done, as beyond
   /// the reach, all rows are done together: a strict priority would shake the arm there.
@@ -118,6 +126,8 @@ struct ServoStep {
   /// In [0, 1], the part that limits left of the rule's speed (Scale), or of its twist along itself (Redistribute).
   double scale = 1.0;
   std::uint16_t limiting_joints = 0;  ///< bit i: joint i is held at a limit that the rule's answer would break
+  bool tool_speed_limits = false;     ///< max_tool_speed has slowed the motion down
+  double tool_speed = 0.0;  ///< [m/s] of the fastest checked point over the cycle; 0 without a max_tool_speed
   TaskVector singular_values;         ///< of the weighted task Jacobian, from large to small; empty while holding
   std::uint8_t singular = 0;          ///< bit i: direction i is singular to the rule, i from 0 to task_rows − 1
   int task_rows = 0;                  ///< m', the number of directions
@@ -175,6 +185,26 @@ struct ServoStep {
 /// commands are those of a servo without a guide. Targets that move, and twists, are never overruled. The constructor
 /// takes about 2 ms.
 ///
+/// *Time of a cycle.* update(), update_twist() and hold() take the time since the last call on the robot's clock, in
+/// [kShortestCycle, kLongestCycle] times options().dt; options().dt where no time is given. A program that loses a
+/// packet, or whose loop is not even, tells the time that has passed, and all limits hold against the clock: the
+/// position command advances by q̇ dt, and q̇ changes by no more than the acceleration limit times dt. limits.hpp says
+/// how accelerations are counted on a clock that is not even, and what is promised at the change. A time outside the
+/// range is bad input: the arm brakes in a cycle of the nearest time in the range. With options().dt in each call the
+/// commands are the same, to the last digit, as without a time. From another time on, until reset(), joints brake
+/// earlier before their position limits, because the times of the cycles to come are unknown.
+///
+/// *Tool speed* (ServoOptions::max_tool_speed). In each cycle the distance that every checked point moves is at most
+/// max_tool_speed times the time of the cycle. The motion slows down along its direction in joint space. To go on, the
+/// servo keeps a stop in proportion, q̇(t) = σ(t) q̇ with σ falling from 1 to 0 in T = max |q̇_i|/A_i: while a point with
+/// the speed g and the curvature c = |q̇ᵀ(∂J/∂q)q̇| brakes, its speed is at most σ (g + c ∫σ) ≤ M, where
+///
+///     M = g  where c T ≤ g,  else  (g + c T)²/(4 c T),
+///
+/// and commands keep M ≤ max_tool_speed at the end of the cycle. Where acceleration or position limits keep the arm
+/// from that (a start that is faster, joints that brake one by one at their position limits, jerk limits while the
+/// acceleration has to fall first), these limits come first, and the arm takes the slowest motion that they leave.
+///
 /// A servo remembers the motion that it commanded (LimitTracker), the posture, the fading after reset(), and
 /// guesses that make the next cycle cheap and continuous: decompositions and an active set.
 class Servo {
@@ -209,20 +239,25 @@ class Servo {
   /// \param feedforward twist [v; ω] of a target that moves, base axes, at the target's origin; added to gain × error,
   ///     after the error's caps. Behind a target of constant twist the tip lags by speed/gain without the feedforward,
   ///     and not at all with it.
-  ServoStep update(const Pose& target, const Twist& feedforward = Twist::Zero()) noexcept;
+  /// \param dt [s] the time since the last call; see Servo, time of a cycle
+  ServoStep update(const Pose& target, const Twist& feedforward = Twist::Zero(),
+                   std::optional<double> dt = std::nullopt) noexcept;
 
   /// One cycle along a twist [v; ω], base axes, at the tip's origin. Real time.
-  ServoStep update_twist(const Twist& twist) noexcept;
+  ServoStep update_twist(const Twist& twist, std::optional<double> dt = std::nullopt) noexcept;
   /// One cycle along a twist [v; ω] of another point, or in the tool's axes, as jog devices send it. Real time.
   /// \param frame the axes of the twist and of `point`
   /// \param point [m] that moves at v: in base where the axes are the base's; from the tip's origin where they are the
   ///     tool's, so that zero is the tip's origin
-  ServoStep update_twist(const Twist& twist, Frame frame, const Eigen::Vector3d& point) noexcept;
+  ServoStep update_twist(const Twist& twist, Frame frame, const Eigen::Vector3d& point,
+                         std::optional<double> dt = std::nullopt) noexcept;
   /// Targets of update() since the servo was made whose rotation was off by more than rounding, and was made one.
   std::int64_t rough_targets() const noexcept { return rough_targets_; }
 
   /// One cycle of the fastest stop that the limits allow, or of rest: Holding; before reset() BadInput. Real time.
-  ServoStep hold() noexcept { return stop(Status::Holding); }
+  ServoStep hold(std::optional<double> dt = std::nullopt) noexcept {
+    return stop(begin_cycle(dt) ? Status::Holding : Status::BadInput);
+  }
 
   /// Takes over from another servo of the same arm and dt, while the arm moves: rule and options are this servo's, and
   /// its command is faded in from the other servo's last velocity over soft_start. The posture is the other servo's
@@ -255,6 +290,8 @@ class Servo {
   const Method& method() const noexcept { return solver_.method(); }
   /// (n,) the reference configuration; empty before reset().
   const JointVector& q() const noexcept { return tracker_.q(); }
+  /// [s], the time of the last cycle, or of the one that has begun.
+  double cycle() const noexcept { return tracker_.cycle(); }
   /// (n,) velocity of the last cycle.
   const JointVector& qdot() const noexcept { return tracker_.qdot(); }
   /// Pose of the tip at q(), of the tool where there is one.
@@ -273,6 +310,7 @@ class Servo {
   void begin(const JointRef& posture) noexcept;
   // Pose and Jacobian of the tip, with the tool, at the reference.
   void locate() noexcept;
+  bool begin_cycle(std::optional<double> dt) noexcept;
   ServoStep stop(Status status) noexcept;
   ServoStep resolve(const Twist& twist, const Twist* feedforward, bool fade, const JointVector* goal) noexcept;
   JointVector posture_velocity() const noexcept;
@@ -306,6 +344,16 @@ class Servo {
   void approach(ServoStep& step, bool redistributes) noexcept;
   void lead(const JointVector& goal, ServoStep& step) noexcept;
   void judge(const JointVector& asked, ServoStep& step) const noexcept;
+
+  // servo_speed.cpp
+  bool holds_tool_speed() const noexcept { return options_.max_tool_speed < std::numeric_limits<double>::infinity(); }
+  double tool_speed(const JointVector& qdot) const noexcept;
+  double braking_limit(int i) const noexcept;
+  double tool_speed_part(const JointVector& qdot) const noexcept;
+  JointVector nearest_slow(const JointVector& slow, const JointVector& fast) const noexcept;
+  JointVector slowest(JointVector qdot, const VelocityBounds& bounds) const noexcept;
+  void slow_tool(ServoStep& step) noexcept;
+  void hold_tool_speed(ServoStep& step) noexcept;
 
   // servo_redistribution.cpp
   JointVector redistribute(const JointVector& qdot, const VelocityBounds& bounds, ServoStep& step) noexcept;

@@ -50,10 +50,11 @@ struct TargetStreamOptions {
 /// How a sample was treated.
 enum class SampleStatus : std::int8_t {
   Accepted = 0,
-  Relocated = 1,   ///< accepted after a run of refused ones: the target is somewhere else, or the clock was set
+  Relocated = 1,   ///< accepted after a run of refused ones: the target is somewhere else, or a clock was set
   Outlier = 2,     ///< refused: too far from the last one for max_speed or max_angular_speed
   OutOfOrder = 3,  ///< refused: its stamp is not later than the last one's
   Invalid = 4,     ///< refused: not finite, not a pose, or more than 10⁹ m away
+  Ahead = 5,       ///< refused: its stamp is later than the time of at() by more than the timeout
 };
 
 /// Number of samples with each status.
@@ -64,13 +65,15 @@ struct SampleCounts {
   std::int64_t out_of_order = 0;  ///< samples of SampleStatus::OutOfOrder
   std::int64_t invalid = 0;       ///< samples of SampleStatus::Invalid
   std::int64_t rough = 0;         ///< samples whose rotation was made one, see is_rough()
+  std::int64_t ahead = 0;         ///< samples of SampleStatus::Ahead
+  std::int64_t clock_steps = 0;   ///< steps of the clock of at(), and of the stamps against this clock
 };
 
 /// The state of the stream, ordered from the best to the worst.
 enum class StreamStatus : std::int8_t {
   Tracking = 0,  ///< as the samples say, or within the horizon of the last one
   Coasting = 1,  ///< longer without a sample than the horizon: coming to rest
-  Stale = 2,     ///< longer than the timeout: holding still
+  Stale = 2,     ///< longer than the timeout, or a clock has stepped: holding still
   Waiting = 3,   ///< no sample yet: where reset() said, or nowhere
 };
 
@@ -84,7 +87,7 @@ struct Target {
   Pose pose = Pose::Identity();                 ///< tip in base
   Twist twist = Twist::Zero();                  ///< derivative of the pose: [v; ω], base axes, at its origin
   StreamStatus status = StreamStatus::Waiting;  ///< the state of the stream
-  double age = 0.0;                             ///< [s] since the newest sample was taken; 0 before the first
+  double age = 0.0;                             ///< [s] ≥ 0 since the newest sample was taken; 0 before the first
 };
 
 /// The link from a sensor to a servo: samples come at any time, late, doubled, wrong or not at all; targets go out each
@@ -122,6 +125,19 @@ struct Target {
 /// z = (D + k)² d shrinks along its own direction, so a bounded approach does not overshoot. A motion whose own
 /// u = (D + 2D²/k + D³/k²) x is longer than V is followed late: among these are fades shorter than 1.8 τ from the
 /// largest speed, and interpolated samples that noise moves apart.
+///
+/// *Clocks that step.* A clock may be set while the arm moves. As soon as at() sees a step, the target holds still where
+/// it is: its twist is zero and its status Stale; from there it goes on smoothly with the samples of the new clock.
+///   - The time of at() is before that of the last call, by more than 5 ms (less is two threads that read the clock in
+///     turn, and gets the last target again). Samples that are later than the new time belong to the old clock, and are
+///     forgotten. Any time before counts as a step, also after one wrong time far ahead.
+///   - The time of at() is later by more than the timeout, and by more than four times the last cycle.
+///   - The newest sample is later than the time of at() by more than the timeout.
+/// Stamps that are off from the clock of at() by more than the timeout (ahead of the clock, or behind it after a jump
+/// back or a step of the clock) are refused. If such samples go on, agree with each other, and are as far apart as the
+/// calls of at() between them, the sensor's clock has stepped: the third of them, or the second after half of the
+/// timeout, is taken as of now (Relocated), and the stream keeps the difference of the clocks from then on, until the
+/// stamps agree with the clock of at() again. One wrong stamp among good ones is lost, and nothing else.
 class TargetStream {
  public:
   /// \throws Error where an option is out of its range
@@ -137,8 +153,8 @@ class TargetStream {
   /// Adds a sample: the time [s] at which it was taken, and the pose at this time. Real time.
   SampleStatus push(double time, const Pose& pose) noexcept;
 
-  /// The target at `time` [s]. If `time` is before that of the last call, or not finite, the answer is the last target.
-  /// Real time.
+  /// The target at `time` [s]. Where the clock steps, and for a time that is not finite, the target holds still. Real
+  /// time.
   Target at(double time) noexcept;
 
   /// The settings, as given.
@@ -160,6 +176,11 @@ class TargetStream {
 
   const Sample& sample(int i) const noexcept { return history_[static_cast<std::size_t>((first_ + i) % kHistory)]; }
   bool reachable(const Sample& from, const Sample& to) const noexcept;
+  bool of_another_clock(double time) const noexcept;
+  SampleStatus refuse(const Sample& next, SampleStatus why, double stamp) noexcept;
+  bool keeps_pace(double time) const noexcept;
+  bool step_of_clock(double time) noexcept;
+  void hold_still() noexcept;
   void start(const Sample& sample) noexcept;
   void extend(const Sample& sample) noexcept;
   void correct(const Sample& sample) noexcept;
@@ -178,6 +199,12 @@ class TargetStream {
   Covariance linear_{}, angular_{};
   Sample candidate_;  // the last refused sample
   int candidates_ = 0;
+  double first_stamp_ = 0.0, first_clock_ = 0.0;  // of the first candidate: its time, and that of the last at() then
+  double shift_ = 0.0;                            // [s] the stamps' clock minus that of at()
+  double period_ = 0.0;                           // [s] between the last two calls of at()
+  bool other_clock_ = false;                      // the candidates' stamps are off from the clock of at()
+  bool called_ = false;                           // at() was called since the newest sample
+  bool stepped_ = false;                          // the clock of at() has stepped forwards, and no sample followed
   Target last_;
   Twist acceleration_ = Twist::Zero();  // of last_, the derivative of its twist
   double time_ = 0.0;
