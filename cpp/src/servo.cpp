@@ -6,6 +6,7 @@
 
 #include <sigmaik/pose.hpp>
 
+#include "collision_guard.hpp"
 #include "finite.hpp"
 #include "guide.hpp"
 #include "length.hpp"
@@ -100,7 +101,8 @@ Servo::Servo(Chain chain, const Method& method, const ServoOptions& options)
   solver_.set_pace(pace_of(tracker_, solver_.length_scale()));
   following_error_ = expected_error_ = JointVector::Zero(chain_.dof());
   expect_motion();
-  if (options.guided) guide_ = detail::GuideOwner(std::make_unique<detail::Guide>(*this));
+  set_collisions();
+  if (options.guided) guide_ = detail::Owner<detail::Guide>(std::make_unique<detail::Guide>(*this));
 }
 
 void Servo::reset(const JointRef& q, const JointRef& qdot, const JointRef& qddot) {
@@ -124,6 +126,7 @@ void Servo::begin(const JointRef& posture) noexcept {
   slowing_.reset();
   exact_spectrum_ = rest_spectrum_ = Spectrum{};
   sigmaik::update(chain_, tracker_.q(), state_);
+  look_around(nullptr, 0.0);
   fade_ = 0.0;
   expect_motion();
   forget_guide();
@@ -262,6 +265,7 @@ void Servo::forget_guide() noexcept {
 // `feedforward`: null for a twist command, which has nowhere to arrive. `goal`: null, or where the guide leads to.
 ServoStep Servo::resolve(const Twist& twist, const Twist* feedforward, bool fade, const JointVector* goal) noexcept {
   if (tracker_.q().size() == 0) return stop(Status::BadInput);
+  if (guard_) guard_->begin();
   const Eigen::Matrix3d& rotation = state_.tip.linear();
   const JointVector posture = posture_velocity();
   Solution solution = solver_.solve(state_.jacobian, twist, posture, rotation);
@@ -285,7 +289,7 @@ ServoStep Servo::resolve(const Twist& twist, const Twist* feedforward, bool fade
   if (goal != nullptr) {
     lead(*goal, step);
     rule = false;
-  } else if (tracker_.has_jerk() || !tracker_.bounds().contain(step.qdot)) {
+  } else if (tracker_.has_jerk() || !tracker_.bounds().contain(step.qdot) || !clears(step.qdot)) {
     limit(step);
     rule = false;
   }
@@ -293,6 +297,7 @@ ServoStep Servo::resolve(const Twist& twist, const Twist* feedforward, bool fade
   if (!detail::finite(tracker_.q() + options_.dt * step.qdot) || !detail::finite(step.achieved_twist)) {
     return stop(Status::BadInput);
   }
+  if (shield(solution.qdot, step)) rule = false;
   take(step, rule);
   return step;
 }
@@ -321,6 +326,7 @@ void Servo::take(ServoStep& step, bool achieved) noexcept {
     for (int i = 0; i < chain_.dof(); ++i) step.achieved_twist += step.qdot[i] * state_.jacobian.col(i);
   }
   sigmaik::update(chain_, step.q, state_);
+  look_around(&step, options_.dt);
 }
 
 }  // namespace sigmaik

@@ -90,6 +90,7 @@ JointVector Servo::nearest(const JointVector& begin, const TaskJacobian& rows, c
     problem_.lower.head(n) = bounds.lower - qdot;
     problem_.upper.head(n) = bounds.upper - qdot;
     problem_.d = goal - rows.lazyProduct(qdot);
+    add_clear_rows(qdot);
     const LeastSquaresSolution solution = least_squares_.solve(problem_);
     if (solution.status == LeastSquaresStatus::BadInput) {  // numbers too far apart
       return begin.cwiseMax(bounds.lower).cwiseMin(bounds.upper);

@@ -50,6 +50,10 @@
 #include <sigmaik/layout.hpp>
 #include <sigmaik/types.hpp>
 
+namespace sigmaik::detail {
+class StopPath;
+}  // namespace sigmaik::detail
+
 namespace sigmaik {
 
 /// Selects the limits of a chain that a LimitTracker holds, and the least speed of a recovery.
@@ -152,6 +156,8 @@ class LimitTracker {
   /// [rad/s² or m/s²], the acceleration limit of joint i that is held, the assumed one where the model has none;
   /// infinite where there is none.
   double acceleration_limit(int i) const noexcept { return acceleration_[static_cast<std::size_t>(i)] * per_dt_; }
+  /// [rad/s³ or m/s³], the jerk limit of joint i that is held; infinite where there is none.
+  double jerk_limit(int i) const noexcept { return jerk_[static_cast<std::size_t>(i)] * per_dt_ * per_dt_; }
   /// Whether acceleration or jerk limits are held: a command then takes time.
   bool delays() const noexcept { return has_jerk() || least_acceleration() < std::numeric_limits<double>::infinity(); }
   /// Whether a joint has a jerk limit that is held.
@@ -194,6 +200,7 @@ class LimitTracker {
   const LimitOptions& options() const noexcept { return options_; }
 
  private:
+  friend class detail::StopPath;  // follows the stop after a command
   struct Window;
   // One number for each joint. Velocities keep their unit; all other quantities are in velocities and cycles: positions
   // [1/dt], changes of velocity in a cycle, and changes of these changes.
