@@ -32,6 +32,9 @@ Obstacle named(Obstacle obstacle, const std::string& name, const std::vector<std
   return obstacle;
 }
 
+using MaybeName = py::typing::Optional<py::str>;
+using Found = py::typing::Tuple<py::float_, MaybeName, MaybeName, py::array_t<double>, py::array_t<double>>;
+
 // An Obstacle, or a shape of sigmaik.planning: by what it has.
 void add_obstacles(const py::handle& object, std::vector<Obstacle>& out) {
   if (py::isinstance<Obstacle>(object)) return out.push_back(object.cast<Obstacle>());
@@ -239,7 +242,8 @@ void bind_world(py::class_<Collisions>& c) {
             const auto name = [&](int i) {
               return i < 0 ? py::object(py::none()) : py::str(s.body_names()[static_cast<std::size_t>(i)]);
             };
-            return py::make_tuple(p.distance, name(p.body), name(p.other), to_numpy(p.point), to_numpy(p.other_point));
+            return Found(
+                py::make_tuple(p.distance, name(p.body), name(p.other), to_numpy(p.point), to_numpy(p.other_point)));
           },
           py::arg("q"),
           "The nearest pair at q (n,): distance [m], the names of both bodies, and their nearest points (3,) [m] in "

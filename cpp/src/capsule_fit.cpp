@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 #include <numbers>
 #include <utility>
 
@@ -27,6 +28,7 @@ struct Cover {
   std::vector<int> segments;
   Capsule capsule;
   double volume = 0.0;
+  int id = 0;
 };
 
 double volume_of(const Capsule& c) {
@@ -52,7 +54,7 @@ Capsule search(Vector3 a, Vector3 b, const std::vector<Ball>& balls, double size
   };
   Capsule best = made(a, b);
   double least = volume_of(best);
-  for (double step = 0.2 * size; step > 1e-4 * size;) {
+  for (double step = 0.2 * size; step > 1e-3 * size;) {
     bool better = false;
     for (int k = 0; k < 12; ++k) {
       Capsule other = best;
@@ -110,7 +112,7 @@ Cover cover_of(const LinkShape& shape, const Pose& to_group) {
       break;
     case LinkShape::Kind::Cylinder: {
       placed.shape = Obstacle::Shape::Cylinder;
-      constexpr int kCorners = 24;
+      constexpr int kCorners = 16;
       const double radius = shape.size[0] / std::cos(std::numbers::pi / kCorners);
       for (int k = 0; k < kCorners; ++k) {
         const double angle = 2.0 * std::numbers::pi * k / kCorners;
@@ -188,31 +190,52 @@ Cover along_link(const Chain& chain, int segment, double radius, const Pose& at,
 
 using Groups = std::vector<std::vector<Cover>>;  // one for each number of joints that move the links
 
-// Joins the two covers of one group that this makes the least larger. Returns false where no group has two.
-bool join_two(Groups& groups) {
-  double least = kInfinity;
-  std::array<std::size_t, 3> where{};
-  Cover best;
-  for (std::size_t g = 0; g < groups.size(); ++g) {
-    for (std::size_t i = 0; i < groups[g].size(); ++i) {
-      for (std::size_t j = 0; j < i; ++j) {
-        if (groups[g][i].shapes.empty() != groups[g][j].shapes.empty()) continue;
-        Cover both = joined(groups[g][j], groups[g][i]);
-        const double more = both.volume - groups[g][i].volume - groups[g][j].volume;
-        if (more < least) {
-          least = more;
-          where = {g, i, j};
-          best = std::move(both);
+// Joins covers of one group, the two that this makes the least larger first.
+class Joiner {
+ public:
+  explicit Joiner(Groups& groups) : groups_(groups) {
+    for (std::vector<Cover>& group : groups) {
+      for (Cover& cover : group) cover.id = ids_++;
+    }
+  }
+
+  // Returns false where no group has two covers that can be joined.
+  bool join_two() {
+    double least = kInfinity;
+    std::array<std::size_t, 3> where{};
+    for (std::size_t g = 0; g < groups_.size(); ++g) {
+      for (std::size_t i = 0; i < groups_[g].size(); ++i) {
+        for (std::size_t j = 0; j < i; ++j) {
+          const Cover &a = groups_[g][j], &b = groups_[g][i];
+          if (a.shapes.empty() != b.shapes.empty()) continue;
+          const double more = both(a, b).volume - a.volume - b.volume;
+          if (more < least) {
+            least = more;
+            where = {g, i, j};
+          }
         }
       }
     }
+    if (least == kInfinity) return false;
+    std::vector<Cover>& group = groups_[where[0]];
+    Cover found = both(group[where[2]], group[where[1]]);
+    found.id = ids_++;
+    group[where[2]] = std::move(found);
+    group.erase(group.begin() + static_cast<std::ptrdiff_t>(where[1]));
+    return true;
   }
-  if (least == kInfinity) return false;
-  std::vector<Cover>& group = groups[where[0]];
-  group[where[2]] = std::move(best);
-  group.erase(group.begin() + static_cast<std::ptrdiff_t>(where[1]));
-  return true;
-}
+
+ private:
+  const Cover& both(const Cover& a, const Cover& b) {
+    const auto key = std::pair(a.id, b.id);
+    const auto known = joined_.find(key);
+    return known != joined_.end() ? known->second : joined_.emplace(key, joined(a, b)).first->second;
+  }
+
+  Groups& groups_;
+  int ids_ = 0;
+  std::map<std::pair<int, int>, Cover> joined_;
+};
 
 std::vector<FittedCapsule> made_of(const Groups& groups, const std::vector<int>& first) {
   std::vector<FittedCapsule> out;
@@ -255,7 +278,8 @@ std::vector<FittedCapsule> fit_capsules(const Chain& chain, const std::vector<Li
                                  : cover_of(shape, to_group));
     ++count;
   }
-  for (; count > most && join_two(groups); --count) {
+  Joiner joiner(groups);
+  for (; count > most && joiner.join_two(); --count) {
   }
   return made_of(groups, first);
 }

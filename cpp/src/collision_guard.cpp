@@ -32,7 +32,7 @@ CollisionGuard::CollisionGuard(std::shared_ptr<CollisionModel> model, double gai
       gain_(gain),
       lower_(model_->pairs.size(), 0.0),
       is_exact_(model_->pairs.size(), 0),
-      floor_(model_->pairs.size(), 0.0) {
+      floor_(model_->pairs.size(), model_->options.margin - kRounding) {
   for (JointVector& row : row_) row = JointVector::Zero(model_->chain.dof());
 }
 

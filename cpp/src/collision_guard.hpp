@@ -48,6 +48,7 @@ class CollisionGuard {
   bool shield(const LimitTracker& tracker, JointVector& qdot) noexcept;
 
  private:
+  static constexpr double kRounding = 1e-10;  // [m] a distance that is missed by less is kept
   static constexpr int kListed = 64;     // pairs that are verified together
   static constexpr int kLooks = 32;      // most configurations of one verification
   static constexpr int kBisections = 4;  // of the way from the stop to the command
@@ -107,7 +108,8 @@ class CollisionGuard {
   std::vector<double> floor_;  // what each pair's stop leaves, at most the margin
   double clearance_ = kInfinity;
   int nearest_ = -1;
-  bool sure_ = false;  // the stop was verified, and nothing has changed since
+  bool sure_ = false;          // the stop was verified, and nothing has changed since
+  bool floors_found_ = false;  // a floor is not the margin
 
   int rows_ = 0;
   std::array<JointVector, kMaxInequalities> row_;

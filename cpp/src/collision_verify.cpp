@@ -6,15 +6,11 @@
 #include "collision_guard.hpp"
 
 namespace sigmaik::detail {
-namespace {
-
-constexpr double kRounding = 1e-10;  // [m] a distance that is missed by less is kept
-
-}  // namespace
 
 bool CollisionGuard::shield(const LimitTracker& tracker, JointVector& qdot) noexcept {
   const double dt = tracker.dt();
-  std::fill(floor_.begin(), floor_.end(), model_->options.margin - kRounding);
+  if (floors_found_) std::fill(floor_.begin(), floor_.end(), model_->options.margin - kRounding);
+  floors_found_ = false;
   if (clear(StopPath(tracker, qdot), dt)) {
     sure_ = !moving_;
     return false;
@@ -132,6 +128,7 @@ double CollisionGuard::dip(const BodyPair& pair, const JointVector& change, cons
 // The least distance that the stop leaves to each pair, where this is less than the margin.
 void CollisionGuard::find_floors(const LimitTracker& tracker) noexcept {
   constexpr int kParts = 8;
+  floors_found_ = true;
   const double dt = tracker.dt();
   const StopPath path(tracker, tracker.stop());
   reach_now(&path);

@@ -79,11 +79,10 @@ class ClearWatch {
     double least = std::min({(on(b, a.first) - a.first).norm(), (on(b, a.second) - a.second).norm(),
                              (on(a, b.first) - b.first).norm(), (on(a, b.second) - b.second).norm()});
     const Eigen::Vector3d u = a.second - a.first, v = b.second - b.first, w = b.first - a.first;
-    Eigen::Matrix<double, 3, 2> m;
-    m << u, -v;
-    if (u.cross(v).norm() > 1e-9 * u.norm() * v.norm()) {
-      const Eigen::Vector2d s = m.colPivHouseholderQr().solve(w);
-      if (s.minCoeff() >= 0.0 && s.maxCoeff() <= 1.0) least = std::min(least, (m * s - w).norm());
+    const double uu = u.squaredNorm(), vv = v.squaredNorm(), uv = u.dot(v), square = uu * vv - uv * uv;
+    if (square > 1e-12 * uu * vv) {
+      const double s = (u.dot(w) * vv - v.dot(w) * uv) / square, t = (u.dot(w) * uv - v.dot(w) * uu) / square;
+      if (s >= 0.0 && s <= 1.0 && t >= 0.0 && t <= 1.0) least = std::min(least, (s * u - t * v - w).norm());
     }
     return least;
   }

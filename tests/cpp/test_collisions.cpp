@@ -2,6 +2,7 @@
 #include <doctest/doctest.h>
 
 #include <cmath>
+#include <map>
 #include <string>
 
 #include <sigmaik/sigmaik.hpp>
@@ -62,6 +63,18 @@ struct Case {
   double margin;
 };
 
+// The capsules of an arm, fitted once.
+const std::vector<LinkCapsule>& capsules_of(const Chain& chain) {
+  static std::map<std::string, std::vector<LinkCapsule>> known;
+  std::vector<LinkCapsule>& capsules = known[chain.urdf()];
+  if (capsules.empty()) capsules = Collisions(chain).capsules();
+  return capsules;
+}
+
+Collisions collisions_of(const Chain& chain, const std::vector<Obstacle>& obstacles, double margin) {
+  return {chain, capsules_of(chain), obstacles, {.margin = margin}};
+}
+
 Case random_case(test::Random& random, const Chain& chain) {
   for (;;) {
     Case out;
@@ -69,9 +82,18 @@ Case random_case(test::Random& random, const Chain& chain) {
     const int count = random.integer(0, 6);
     for (int i = 0; i < count; ++i) out.obstacles.push_back(random_obstacle(random, chain.characteristic_length()));
     out.q = test::start_of(random, chain, 0.9);
-    const Collisions collisions(chain, out.obstacles, {.margin = out.margin, .capsules = 0});
+    const Collisions collisions = collisions_of(chain, out.obstacles, out.margin);
     if (collisions.nearest(out.q).distance > out.margin + 1e-6) return out;
   }
+}
+
+// The same arm with jerk limits.
+Chain with_jerk(const Chain& chain, double per_acceleration) {
+  sigmaik::JointLimits limits = chain.limits();
+  for (int i = 0; i < chain.dof(); ++i) {
+    limits.jerk[i] = per_acceleration * (std::isfinite(limits.acceleration[i]) ? limits.acceleration[i] : 10.0);
+  }
+  return chain.with_limits(limits);
 }
 
 // What a user may send: poses that rest or jump, twists, stops, and no numbers.
@@ -205,12 +227,13 @@ TEST_CASE("rows are the derivatives of distances") {
 
 TEST_CASE("whatever is sent, no pair comes nearer than the margin, and limits hold") {
   for (const char* name : {"ufactory_xarm7", "franka_panda", "ur10"}) {
-    const Chain& chain = test::arms().at(name);
     long held = 0;
-    for (unsigned seed = 0; seed < 5; ++seed) {
+    for (unsigned seed = 0; seed < 6; ++seed) {
       test::Random random(100 + seed);
+      const Chain& arm = test::arms().at(name);
+      const Chain chain = seed % 2 == 0 ? arm : with_jerk(arm, random.decades(0.5, 2.5));
       const Case c = random_case(random, chain);
-      const Collisions collisions(chain, c.obstacles, {.margin = c.margin});
+      const Collisions collisions = collisions_of(chain, c.obstacles, c.margin);
       const test::ClearWatch watch(collisions);
       ServoOptions options{.dt = random.chance(0.5) ? 1e-3 : random.uniform(1e-3, 8e-3)};
       options.on_limit = random.chance(0.7) ? sigmaik::OnLimit::Redistribute : sigmaik::OnLimit::Scale;
@@ -244,7 +267,7 @@ TEST_CASE("towards a target that rests the arm comes to rest, and arrives where 
     for (unsigned seed = 0; seed < 6; ++seed) {
       test::Random random(200 + seed);
       const Case c = random_case(random, chain);
-      const Collisions collisions(chain, c.obstacles, {.margin = c.margin});
+      const Collisions collisions = collisions_of(chain, c.obstacles, c.margin);
       ServoOptions options{.dt = 4e-3};
       Servo plain(chain, sigmaik::JParse{}, options);
       options.collisions = collisions;
@@ -280,7 +303,7 @@ TEST_CASE("a start inside the margin leads outwards, and no pair comes nearer th
     // A ball that overlaps the margin around the flange.
     const Vector3 away = random.unit(3);
     const double gap = random.uniform(-0.01, 0.025);
-    const Collisions bare(chain);
+    const Collisions bare = collisions_of(chain, {}, 0.01);
     if (!(bare.nearest(q).distance > 0.04)) continue;
     const Vector3 center = tip.translation() + 0.15 * away;
     double reach = 1.0;
@@ -294,7 +317,7 @@ TEST_CASE("a start inside the margin leads outwards, and no pair comes nearer th
     }
     if (!(reach - gap > 0.01)) continue;
     ++seen;
-    const Collisions collisions(chain, {Obstacle::sphere(center, reach - gap)}, {.margin = 0.03});
+    const Collisions collisions = collisions_of(chain, {Obstacle::sphere(center, reach - gap)}, 0.03);
     ServoOptions options;
     options.collisions = collisions;
     Servo servo(chain, sigmaik::JParse{}, options);
@@ -336,7 +359,7 @@ TEST_CASE("a redundant arm goes round with its elbow where the tool's way is cle
   const Collisions bare(chain);
   const test::ClearWatch watch(bare);
   bool moved = false;
-  const Pose elbow = watch.link_pose(q, "panda_link4", moved);
+  const Pose elbow = watch.link_pose(q, "link4", moved);
   // A wall that keeps the elbow from where it is, by a little.
   ServoOptions options;
   options.collisions = Collisions(
@@ -415,7 +438,7 @@ TEST_CASE("cycles among obstacles, and moves of these, need no heap") {
   std::vector<Obstacle> obstacles = c.obstacles;
   obstacles.push_back(Obstacle::box(random.pose(0.7), {0.1, 0.1, 0.1}));
   ServoOptions options;
-  options.collisions = Collisions(chain, obstacles, {.margin = c.margin});
+  options.collisions = collisions_of(chain, obstacles, c.margin);
   Servo servo(chain, sigmaik::JParse{}, options);
   servo.reset(c.q);
   const Pose target = sigmaik::pose(chain, test::sample(random, chain)), place = random.pose(0.8);
