@@ -161,6 +161,7 @@ void bind_status(py::module_& m);
 void bind_chain(py::module_& m);
 void bind_methods(py::module_& m);
 void bind_solver(py::module_& m);
+void bind_collisions(py::module_& m);
 void bind_servo(py::module_& m);
 void bind_servo_batch(py::module_& m);
 void bind_servo_loop(py::module_& m);

@@ -1,3 +1,4 @@
+#include <cmath>
 #include <pybind11/native_enum.h>
 
 #include "servo_options.hpp"
@@ -20,6 +21,9 @@ std::optional<double> cycle_argument(const Servo& servo, const std::optional<dou
   const double nominal = servo.options().dt;
   constexpr double kRounding = 1e-9;
   if (!dt || *dt == nominal) return dt;
+  if (servo.options().collisions && !(std::abs(*dt - nominal) <= kRounding * nominal)) {
+    throw Error("dt = " + text_of(*dt) + " s: a servo with collisions has cycles of its dt, " + text_of(nominal) + " s");
+  }
   if (*dt >= kShortestCycle * nominal * (1.0 - kRounding) && *dt <= kLongestCycle * nominal * (1.0 + kRounding)) return dt;
   throw Error("dt = " + text_of(*dt) + " s must be from " + text_of(kShortestCycle * nominal) + " to " +
               text_of(kLongestCycle * nominal) + " s, a tenth to 20 times the servo's dt");
@@ -100,6 +104,17 @@ void bind_step(py::module_& m) {
           "guide_joints", [](const ServoStep& s) { return indices(s.guide_joints); },
           "Indices of the joints that end elsewhere by the guide's way than by the servo's own: by more than 0.5 rad, "
           "or half of the characteristic length.")
+      .def_readonly("clearance", &ServoStep::clearance,
+                    "[m] the least distance of all pairs of bodies after the step; inf where nothing is checked.")
+      .def_property_readonly(
+          "nearest",
+          [](const ServoStep& s) -> std::optional<std::pair<int, int>> {
+            if (s.nearest[0] < 0) return std::nullopt;
+            return std::pair<int, int>(s.nearest[0], s.nearest[1]);
+          },
+          "The pair of this distance, by the numbers of Collisions.body_names; None: there is no pair.")
+      .def_readonly("limited_by_collisions", &ServoStep::limited_by_collisions,
+                    "Whether the step keeps clear of a body that the rule's answer would come too near to.")
       .def("__repr__", [](const ServoStep& s) {
         return std::string("ServoStep(status=") + to_string(s.status) +
                ", qdot=" + py::str(to_numpy(s.qdot)).cast<std::string>() + ")";
@@ -228,6 +243,8 @@ void bind_cycle(py::class_<Servo>& c) {
 void bind_state(py::class_<Servo>& c) {
   c.def_property("method", &Servo::method, &Servo::set_method, "The rule; may be changed between cycles.")
       .def_property_readonly("chain", &Servo::chain)
+      .def_property_readonly(
+          "collisions", [](const Servo& s) { return s.options().collisions; }, "What the arm must not touch, or None.")
       .def_property_readonly(
           "dt", [](const Servo& s) { return s.options().dt; }, "[s]")
       .def_property_readonly("length_scale", &Servo::length_scale, "[m] 1 rad weighs as much as this length.")

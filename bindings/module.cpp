@@ -72,6 +72,7 @@ PYBIND11_MODULE(_core, m) {
   bind_analytic_ik(m);
   bind_methods(m);
   bind_solver(m);
+  bind_collisions(m);
   bind_servo(m);
   bind_servo_batch(m);
   bind_servo_loop(m);

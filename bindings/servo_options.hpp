@@ -137,6 +137,9 @@ struct Fields<ServoOptions> {
             "whether the servo takes another way to a pose target that rests where its own way does not arrive: "
             "through another configuration of the arm, if need be away from the tool's straight line. `step.guide` "
             "says so. Arrives at each target that PositionIk finds."),
+      field("collisions", &ServoOptions::collisions,
+            "what the arm must not touch: no command brings a pair of bodies nearer than the margin. None: nothing is "
+            "checked."),
       nested(&ServoOptions::task),
   };
 };

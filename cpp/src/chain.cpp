@@ -245,7 +245,9 @@ Chain Chain::with_limits(const JointLimits& limits) const {
     s.notes.clear();  // the notes are about the limits that the new ones replace
     ++i;
   }
-  return Chain(model_->base, std::move(segments));
+  Chain out(model_->base, std::move(segments));
+  out.urdf_ = urdf_;
+  return out;
 }
 
 std::vector<std::string> Chain::missing_limits(bool velocity, bool acceleration) const {

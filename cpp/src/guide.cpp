@@ -7,6 +7,8 @@
 
 #include <sigmaik/pose.hpp>
 
+#include "owner.hpp"
+
 namespace sigmaik {
 
 const char* to_string(GuideState state) noexcept {
@@ -23,16 +25,7 @@ const char* to_string(GuideState state) noexcept {
 
 namespace detail {
 
-GuideOwner::GuideOwner() noexcept = default;
-GuideOwner::GuideOwner(std::unique_ptr<Guide> guide) noexcept : guide_(std::move(guide)) {}
-GuideOwner::GuideOwner(const GuideOwner& other)
-    : guide_(other.guide_ != nullptr ? std::make_unique<Guide>(*other.guide_) : nullptr) {}
-GuideOwner::GuideOwner(GuideOwner&& other) noexcept = default;
-GuideOwner& GuideOwner::operator=(GuideOwner other) noexcept {
-  guide_ = std::move(other.guide_);
-  return *this;
-}
-GuideOwner::~GuideOwner() = default;
+template class Owner<Guide>;
 
 namespace {
 

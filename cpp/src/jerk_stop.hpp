@@ -25,6 +25,9 @@ class JerkStop {
     end_ = steady_ + ramp;
   }
 
+  // At rest.
+  JerkStop() noexcept : JerkStop(0.0, 0.0, 1.0, 1.0) {}
+
   // Velocity and slope t cycles later. Each phase is evaluated from its nearer end, so that rounding stays small for
   // t ≤ 1.
   void sample(double t, double& v, double& a) const noexcept {
@@ -44,14 +47,24 @@ class JerkStop {
   }
 
   // Σ_{i≥1} v(i): the stopping distance after the first sample [velocities × cycles].
-  double distance() const noexcept {
-    const double n1 = floor_of(falling_), n2 = floor_of(steady_), n3 = floor_of(end_);
+  double distance() const noexcept { return travel(end_); }
+
+  // The part of this sum of the samples i ≤ t.
+  double travel(double t) const noexcept {
+    const double n1 = floor_of(std::min(t, falling_)), n2 = floor_of(std::min(t, steady_));
+    const double n3 = floor_of(std::min(t, end_));
     double sum = sum_falling(n1);
     if (n2 > n1) sum += (n2 - n1) * (velocity_falling(falling_) - p_ * (0.5 * (n1 + 1.0 + n2) - falling_));
     const double c = n3 - n2, f = end_ - n3;  // c samples, at f, f + 1, … before the end
     sum += 0.5 * j_ * c * (f * f + (c - 1.0) * (f + (2.0 * c - 1.0) * (1.0 / 6.0)));
     return sign_ * sum;
   }
+
+  // [cycles] until rest.
+  double end() const noexcept { return end_; }
+
+  // Whether the motion turns round on the way.
+  bool turns() const noexcept { return v_ < 0.0; }
 
   // The largest of 0 and the partial sums of v(i), i ≥ 1: the highest position on the way.
   double rise() const noexcept {

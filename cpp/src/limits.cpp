@@ -13,16 +13,20 @@
 #include "limits_window.hpp"
 #include "message.hpp"
 #include "numbers.hpp"
+#include "stopping.hpp"
 
 namespace sigmaik {
 namespace {
 
 using detail::braking;
 using detail::fastest_after;
+using detail::kArrivalAcceleration;
+using detail::kArrivalJerk;
 using detail::kInfinity;
 using detail::kLimitTolerance;
 using detail::require;
 using detail::slowest_after;
+using detail::speed_before;
 constexpr double kSnap = 1e-12;  // [1 + rad or m] rounding of positions as they add up
 
 // D⁻¹(d) of limits.hpp, d [velocities × cycles] ≥ 0, a = A dt.
@@ -32,18 +36,6 @@ double fastest_before(double d, double a) noexcept {
   // At the corners of D⁻¹ its two lines agree, so a wrongly rounded N does no harm.
   return d / (steps + 1.0) + 0.5 * a * steps;
 }
-
-// The velocity from which a joint can stop within d, under |v'| ≤ a and |v''| ≤ j, from no acceleration to none: D⁻¹ of
-// LimitTracker::arrival(). In velocities and cycles.
-double speed_before(double d, double a, double j) noexcept {
-  if (!(j < kInfinity)) return a < kInfinity ? std::sqrt(2.0 * a * d) : kInfinity;
-  const double corner = a * a / j;
-  if (d * d * j <= corner * corner * corner) return std::cbrt(d * d * j);
-  return std::sqrt(0.25 * corner * corner + 2.0 * a * d) - 0.5 * corner;
-}
-
-// Parts of the acceleration and jerk limits that the plan of an arrival uses.
-constexpr double kArrivalAcceleration = 0.5, kArrivalJerk = 0.125;
 
 }  // namespace
 

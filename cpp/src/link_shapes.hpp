@@ -19,7 +19,8 @@ struct LinkShape {
 // The shapes of all links that move with the arm: the arm's own links, and the links that fixed joints attach beside
 // the arm. A link without <collision> shapes gives its <visual> shapes; one Mesh stands for all shapes of the link that
 // are no box, cylinder or sphere. Throws Error if the source is no URDF or does not contain the chain's links, or if a
-// size is not positive.
-std::vector<LinkShape> read_shapes(const Chain& chain, const std::string& source);
+// size is not positive. Not `strict`: links of the chain that the URDF does not have, such as a tool that was added to
+// the chain, have no shape.
+std::vector<LinkShape> read_shapes(const Chain& chain, const std::string& source, bool strict = true);
 
 }  // namespace sigmaik::detail

@@ -6,6 +6,7 @@
 
 #include <sigmaik/pose.hpp>
 
+#include "collision_guard.hpp"
 #include "finite.hpp"
 #include "guide.hpp"
 #include "length.hpp"
@@ -104,7 +105,8 @@ Servo::Servo(Chain chain, const Method& method, const ServoOptions& options)
   solver_.set_pace(pace_of(tracker_, solver_.length_scale()));
   following_error_ = expected_error_ = JointVector::Zero(chain_.dof());
   expect_motion();
-  if (options.guided) guide_ = detail::GuideOwner(std::make_unique<detail::Guide>(*this));
+  set_collisions();
+  if (options.guided) guide_ = detail::Owner<detail::Guide>(std::make_unique<detail::Guide>(*this));
 }
 
 void Servo::reset(const JointRef& q, const JointRef& qdot, const JointRef& qddot) {
@@ -128,6 +130,7 @@ void Servo::begin(const JointRef& posture) noexcept {
   slowing_.reset();
   exact_spectrum_ = rest_spectrum_ = Spectrum{};
   locate();
+  look_around(nullptr, 0.0);
   fade_ = 0.0;
   expect_motion();
   forget_guide();
@@ -220,6 +223,10 @@ JointVector Servo::posture_velocity() const noexcept {
 // The time of the cycle. Outside the range: the nearest time in the range, and false.
 bool Servo::begin_cycle(std::optional<double> dt) noexcept {
   if (!dt) return tracker_.set_cycle(options_.dt);
+  if (guard_) {  // the stop after a command is verified for cycles of one time
+    tracker_.set_cycle(options_.dt);
+    return std::abs(*dt - options_.dt) <= 1e-9 * options_.dt;
+  }
   if (tracker_.set_cycle(*dt)) return true;
   const double nearest = *dt > options_.dt ? kLongestCycle : *dt < options_.dt ? kShortestCycle : 1.0;  // 1 for NaN
   tracker_.set_cycle(nearest * options_.dt);
@@ -315,6 +322,7 @@ void Servo::forget_guide() noexcept {
 // `feedforward`: null for a twist command, which has nowhere to arrive. `goal`: null, or where the guide leads to.
 ServoStep Servo::resolve(const Twist& twist, const Twist* feedforward, bool fade, const JointVector* goal) noexcept {
   if (tracker_.q().size() == 0) return stop(Status::BadInput);
+  if (guard_) guard_->begin();
   const Eigen::Matrix3d& rotation = state_.tip.linear();
   const JointVector posture = posture_velocity();
   Solution solution = solver_.solve(state_.jacobian, twist, posture, rotation);
@@ -339,7 +347,7 @@ ServoStep Servo::resolve(const Twist& twist, const Twist* feedforward, bool fade
     lead(*goal, step);
     rule = false;
   } else if (tracker_.has_jerk() || !tracker_.bounds().contain(step.qdot) ||
-             (holds_tool_speed() && !(tool_speed_part(step.qdot) <= 1.0))) {
+             (holds_tool_speed() && !(tool_speed_part(step.qdot) <= 1.0)) || !clears(step.qdot)) {
     limit(step);
     rule = false;
   }
@@ -347,6 +355,7 @@ ServoStep Servo::resolve(const Twist& twist, const Twist* feedforward, bool fade
   if (!detail::finite(tracker_.q() + cycle() * step.qdot) || !detail::finite(step.achieved_twist)) {
     return stop(Status::BadInput);
   }
+  if (shield(solution.qdot, step)) rule = false;
   take(step, rule);
   return step;
 }
@@ -376,6 +385,7 @@ void Servo::take(ServoStep& step, bool achieved) noexcept {
     for (int i = 0; i < chain_.dof(); ++i) step.achieved_twist += step.qdot[i] * state_.jacobian.col(i);
   }
   locate();
+  look_around(&step, cycle());
 }
 
 }  // namespace sigmaik

@@ -103,6 +103,8 @@ bool Servo::slow_down_by_rows(const JointVector& asked, bool by_priority, JointV
   const double largest = asked.cwiseAbs().maxCoeff();
   problem_.C.setZero(first + second, unknowns);
   problem_.d.setZero(first + second);
+  problem_.G.resize(0, 0);
+  problem_.h.resize(0);
   problem_.lower.setConstant(unknowns, -kInfinity);
   problem_.upper.setConstant(unknowns, kInfinity);
   for (int i = 0; i < first; ++i) {

@@ -74,7 +74,8 @@ void Servo::limit(ServoStep& step) noexcept {
 // Position limits: the command becomes a velocity inside the heading bounds, and inside the velocity limits still.
 void Servo::head(ServoStep& step) noexcept {
   VelocityBounds heading = tracker_.heading();
-  if (heading.contain(step.qdot)) return;
+  const bool clear = clears(step.qdot);
+  if (clear && heading.contain(step.qdot)) return;
   for (int i = 0; i < chain_.dof(); ++i) {
     const auto at = static_cast<std::size_t>(i);
     const double limit = tracker_.velocity_limit(i);
@@ -87,11 +88,14 @@ void Servo::head(ServoStep& step) noexcept {
       heading.lower_kind[at] = LimitKind::Velocity;
     }
   }
+  const JointVector asked = step.qdot;
   if (options_.on_limit == OnLimit::Redistribute) {
-    step.qdot = redistribute(step.qdot, heading, step);
+    if (clear) step.qdot = redistribute(asked, heading, step);
+    if (!clear || !clears(step.qdot)) head_clear(asked, heading, step);
   } else {
     const JointVector rest = JointVector::Zero(chain_.dof());
-    step.qdot = furthest(rest, step.qdot, heading, step.limiting_joints);
+    step.qdot = furthest(rest, asked, heading, step.limiting_joints);
+    if (!clears(step.qdot)) head_clear(JointVector(step.qdot), heading, step);
   }
 }
 
@@ -136,6 +140,7 @@ void Servo::lead(const JointVector& goal, ServoStep& step) noexcept {
   if (twist.tail<3>().norm() * part > angular) part = angular / twist.tail<3>().norm();
   step.qdot *= std::min(1.0, fade_) * part;
   if (holds_tool_speed()) slow_tool(step);
+  if (!clears(step.qdot)) head_clear(JointVector(step.qdot), tracker_.heading(), step);
   approach(step, false);
   if (holds_tool_speed()) hold_tool_speed(step);
   judge(asked, step);

@@ -97,6 +97,7 @@ JointVector Servo::nearest(const JointVector& begin, const TaskJacobian& rows, c
     problem_.lower.head(n) = heavy.cwiseProduct(bounds.lower - qdot);
     problem_.upper.head(n) = heavy.cwiseProduct(bounds.upper - qdot);
     problem_.d = goal - rows.lazyProduct(qdot);
+    add_clear_rows(qdot);
     const LeastSquaresSolution solution = least_squares_.solve(problem_);
     if (solution.status == LeastSquaresStatus::BadInput) {  // numbers too far apart
       return begin.cwiseMax(bounds.lower).cwiseMin(bounds.upper);

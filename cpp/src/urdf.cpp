@@ -193,8 +193,11 @@ Chain read_chain(const std::string& xml, std::string base, std::string tip, cons
 
 Chain Chain::from_urdf(const std::string& source, const std::string& base, const std::string& tip,
                        const std::vector<double>& acceleration) {
-  return detail::xml::with_label(source,
-                                 [&](const std::string& text) { return read_chain(text, base, tip, acceleration); });
+  return detail::xml::with_label(source, [&](const std::string& text) {
+    Chain chain = read_chain(text, base, tip, acceleration);
+    chain.urdf_ = std::make_shared<const std::string>(text);
+    return chain;
+  });
 }
 
 }  // namespace sigmaik

@@ -59,9 +59,16 @@ void add_shapes(const XMLElement& link, const std::string& name, int segment, co
   if (mesh) shapes.push_back({segment, Kind::Mesh, pose});
 }
 
-std::vector<detail::LinkShape> shapes_of(const Chain& chain, const std::string& xml) {
-  tinyxml2::XMLDocument document;
-  const Tree tree(parse(xml, document));
+// The names of the links from base to tip, in which a link that the URDF does not have is empty.
+std::vector<std::string> links_of(const Chain& chain, const Tree& tree, bool strict) {
+  std::vector<std::string> expected{chain.base()};
+  for (const Segment& segment : chain.segments()) expected.push_back(segment.link_name);
+  if (!strict) {
+    for (std::string& link : expected) {
+      if (!tree.has_link(link)) link.clear();
+    }
+    return expected;
+  }
   tree.require_link("base", chain.base());
   // Tools (Chain::with_tool) are not in the file, and have no shapes.
   std::size_t count = chain.segments().size();
@@ -71,12 +78,18 @@ std::vector<detail::LinkShape> shapes_of(const Chain& chain, const std::string& 
   tree.require_link("tip", tip);
   std::vector<std::string> links{chain.base()};
   for (const TreeJoint* joint : tree.path(chain.base(), tip)) links.push_back(joint->child);
-  std::vector<std::string> expected{chain.base()};
-  for (std::size_t i = 0; i < count; ++i) expected.push_back(chain.segments()[i].link_name);
+  expected.resize(count + 1);
   if (links != expected) fail("not the arm's: its links are ", listed(links), ", the arm's ", listed(expected));
+  return links;
+}
 
+std::vector<detail::LinkShape> shapes_of(const Chain& chain, const std::string& xml, bool strict) {
+  tinyxml2::XMLDocument document;
+  const Tree tree(parse(xml, document));
+  const std::vector<std::string> links = links_of(chain, tree, strict);
   std::vector<detail::LinkShape> shapes;
   for (std::size_t i = 0; i < links.size(); ++i) {
+    if (links[i].empty()) continue;
     // The link itself, and all links that fixed joints attach to it beside the arm.
     std::vector<std::pair<std::string, Pose>> rigid{{links[i], Pose::Identity()}};
     for (std::size_t k = 0; k < rigid.size(); ++k) {
@@ -94,8 +107,8 @@ std::vector<detail::LinkShape> shapes_of(const Chain& chain, const std::string& 
 
 }  // namespace
 
-std::vector<detail::LinkShape> detail::read_shapes(const Chain& chain, const std::string& source) {
-  return xml::with_label(source, [&chain](const std::string& text) { return shapes_of(chain, text); });
+std::vector<detail::LinkShape> detail::read_shapes(const Chain& chain, const std::string& source, bool strict) {
+  return xml::with_label(source, [&](const std::string& text) { return shapes_of(chain, text, strict); });
 }
 
 }  // namespace sigmaik

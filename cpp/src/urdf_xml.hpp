@@ -68,6 +68,7 @@ class Tree {
 
   const XMLElement& link(const std::string& name) const { return *links_.at(name); }
   const std::string& root() const { return root_; }
+  bool has_link(const std::string& name) const { return links_.count(name) != 0; }
 
   void require_link(const char* role, const std::string& name) const;
 

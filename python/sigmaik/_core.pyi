@@ -681,6 +681,203 @@ def solve_batch(method: Method | str, J: numpy.typing.ArrayLike, twist: numpy.ty
     Raises Error where a shape is wrong or an entry is not finite.
     """
 
+# ---- Collisions -------------------------------------------------------------------------------------------------------
+class Capsule:
+    """
+    All points within `radius` [m] of the segment from a to b; a sphere where a = b.
+    """
+    def __init__(self, a: numpy.typing.ArrayLike, b: numpy.typing.ArrayLike, radius: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        """
+        a, b: (3,) [m], the ends of the segment; radius [m] > 0.
+        """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def a(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3,) [m]
+        """
+    @property
+    def b(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3,) [m]
+        """
+    @property
+    def radius(self) -> float:
+        """
+        [m]
+        """
+class LinkCapsule:
+    """
+    A capsule that is fixed to a link.
+    """
+    def __init__(self, link: str, capsule: Capsule) -> None:
+        """
+        link: the link's name; capsule: in the link's frame.
+        """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def capsule(self) -> Capsule:
+        """
+        In the link's frame.
+        """
+    @property
+    def excess(self) -> float:
+        """
+        [m], how far the capsule stands out from the shapes that it covers, at most; 0 where it was given, NaN where the shape is a mesh.
+        """
+    @property
+    def link(self) -> str:
+        """
+        The link's name.
+        """
+class Obstacle:
+    """
+    A body of the world, in the axes of the arm's base: made by one of its makers.
+    """
+    @staticmethod
+    def box(size: numpy.typing.ArrayLike, pose: numpy.typing.ArrayLike, *, name: str = '', links: collections.abc.Sequence[str] = []) -> Obstacle:
+        """
+        size (3,) [m] of its sides; pose: centre (3,) [m], or pose (4, 4).
+
+        name: how the obstacle is called; links: those that have to keep clear, all by default.
+        """
+    @staticmethod
+    def capsule(a: numpy.typing.ArrayLike, b: numpy.typing.ArrayLike, radius: typing.SupportsFloat | typing.SupportsIndex, *, name: str = '', links: collections.abc.Sequence[str] = []) -> Obstacle:
+        """
+        a, b (3,) [m], radius [m] > 0.
+
+        name: how the obstacle is called; links: those that have to keep clear, all by default.
+        """
+    @staticmethod
+    def cylinder(radius: typing.SupportsFloat | typing.SupportsIndex, length: typing.SupportsFloat | typing.SupportsIndex, pose: numpy.typing.ArrayLike, *, name: str = '', links: collections.abc.Sequence[str] = []) -> Obstacle:
+        """
+        radius, length [m] > 0, along its z; pose: centre (3,) [m], or pose (4, 4).
+
+        name: how the obstacle is called; links: those that have to keep clear, all by default.
+        """
+    @staticmethod
+    def half_space(point: numpy.typing.ArrayLike, normal: numpy.typing.ArrayLike, *, name: str = '', links: collections.abc.Sequence[str] = []) -> Obstacle:
+        """
+        The side of the plane through `point` (3,) [m] that `normal` (3,) points away from: a floor, a wall.
+
+        name: how the obstacle is called; links: those that have to keep clear, all by default.
+        """
+    @staticmethod
+    def sphere(center: numpy.typing.ArrayLike, radius: typing.SupportsFloat | typing.SupportsIndex, *, name: str = '', links: collections.abc.Sequence[str] = []) -> Obstacle:
+        """
+        center (3,) [m], radius [m] > 0.
+
+        name: how the obstacle is called; links: those that have to keep clear, all by default.
+        """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def links(self) -> tuple[str, ...]:
+        """
+        The links that have to keep clear; empty: all that a joint moves.
+        """
+    @property
+    def name(self) -> str:
+        """
+        Empty: obstacle i.
+        """
+    @property
+    def pose(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (4, 4): capsules and cylinders lie along z, a half-space is z ≤ 0.
+        """
+    @property
+    def shape(self) -> str:
+        """
+        'sphere', 'capsule', 'box', 'cylinder' or 'half-space'.
+        """
+    @property
+    def size(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (3,) [m] sphere: radius; capsule: radius, length of the segment; box: sides; cylinder: radius, length.
+        """
+class Collisions:
+    """
+    What an arm must not touch: itself, and obstacles. For Servo(chain, collisions=…).
+
+    Capsules cover the links' shapes; distances between capsules, and to obstacles, are exact. Pairs of links with two
+    or more joints between them are checked, but for those that are near at nine of ten configurations. All servos
+    with the same Collisions share its obstacles and its carried object.
+    """
+    def __init__(self, chain: Chain, obstacles: typing.Any = None, self_collision: bool = True, margin: typing.SupportsFloat | typing.SupportsIndex = 0.01, *, source: typing.Any = None, srdf: typing.Any = None, radius: typing.SupportsFloat | typing.SupportsIndex = 0.05, capsules: typing.SupportsInt | typing.SupportsIndex | None = None, ignore: collections.abc.Sequence[tuple[str, str]] = [], arm: collections.abc.Sequence[LinkCapsule] | None = None) -> None:
+        """
+        obstacles: up to 32 of Obstacle, or of the shapes Box, Sphere, Cylinder of sigmaik.planning, or an Obstacles of
+            these; None: none.
+        self_collision: whether the arm keeps clear of itself.
+        margin: [m] ≥ 0, no pair of bodies comes closer.
+        source: URDF with the links' shapes, a path or XML; None: what the chain was read from. Without a URDF, capsules
+            run from each link's frame to the next.
+        srdf: SRDF whose disable_collisions name pairs of links that need no check, a path or XML; None: none.
+        radius: [m] > 0 of links with meshes, and without a URDF.
+        capsules: the most that the arm gets, at least one a link; None: three more than joints.
+        ignore: more pairs of links that need no check.
+        arm: LinkCapsules of your own; None: capsules are fitted to the shapes.
+        Raises Error where a number is out of its range, a link does not exist, or there are too many bodies.
+        """
+    def __repr__(self) -> str:
+        ...
+    def attach(self, capsules: collections.abc.Sequence[Capsule]) -> None:
+        """
+        Attaches an object of up to 4 capsules to the tip, in the tip's frame, in place of the one that the arm carries.
+        """
+    def detach(self) -> None:
+        """
+        Lets go of the object.
+        """
+    def distance(self, q: numpy.typing.ArrayLike) -> float | numpy.typing.NDArray[numpy.float64]:
+        """
+        The least distance [m] at q (n,), or (B,) at q (B, n); below 0: contact.
+        """
+    def move(self, i: typing.SupportsInt | typing.SupportsIndex, pose: numpy.typing.ArrayLike, twist: numpy.typing.ArrayLike | None = None) -> None:
+        """
+        Moves obstacle i, from any thread, for all servos that have these collisions.
+
+        pose: (4, 4) in the base's axes, or the place of its origin (3,) [m].
+        twist: (6,) [v; ω] of its origin, base axes: until the next call it goes on like this, for at most 0.2 s.
+        Raises Error where there is no obstacle i, or the pose is none.
+        """
+    def nearest(self, q: numpy.typing.ArrayLike) -> tuple[float, str | None, str | None, numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
+        """
+        The nearest pair at q (n,): distance [m], the names of both bodies, and their nearest points (3,) [m] in base.
+        """
+    @property
+    def body_names(self) -> tuple[str, ...]:
+        """
+        Names of the arm's capsules, of the carried ones, and of the obstacles: what step.nearest counts.
+        """
+    @property
+    def capsules(self) -> list[LinkCapsule]:
+        """
+        The arm's LinkCapsules, base to tip.
+        """
+    @property
+    def chain(self) -> Chain:
+        """
+        The arm.
+        """
+    @property
+    def margin(self) -> float:
+        """
+        [m]
+        """
+    @property
+    def obstacles(self) -> list[Obstacle]:
+        """
+        The obstacles, as given.
+        """
+    @property
+    def self_pairs(self) -> list[tuple[int, int]]:
+        """
+        Pairs of the arm's capsules that are checked, by number.
+        """
+
 # ---- Servo ------------------------------------------------------------------------------------------------------------
 class GuideState(enum.IntEnum):
     """
@@ -709,6 +906,11 @@ class ServoStep:
         (6,) what the rule was given: the twist command, or the pose error's [m/s, rad/s]
         """
     @property
+    def clearance(self) -> float:
+        """
+        [m] the least distance of all pairs of bodies after the step; inf where nothing is checked.
+        """
+    @property
     def guide(self) -> GuideState:
         """
         What the guide does, see GuideState.
@@ -719,9 +921,19 @@ class ServoStep:
         Indices of the joints that end elsewhere by the guide's way than by the servo's own: by more than 0.5 rad, or half of the characteristic length.
         """
     @property
+    def limited_by_collisions(self) -> bool:
+        """
+        Whether the step keeps clear of a body that the rule's answer would come too near to.
+        """
+    @property
     def limiting_joints(self) -> tuple[int, ...]:
         """
         Indices of the joints held at a limit that the rule's answer would break.
+        """
+    @property
+    def nearest(self) -> tuple[int, int] | None:
+        """
+        The pair of this distance, by the numbers of Collisions.body_names; None: there is no pair.
         """
     @property
     def not_settling(self) -> bool:
@@ -824,6 +1036,8 @@ class Servo:
         guided: whether the servo takes another way to a pose target that rests where its own way does not
             arrive: through another configuration of the arm, if need be away from the tool's straight line.
             `step.guide` says so. Arrives at each target that PositionIk finds.
+        collisions: what the arm must not touch: no command brings a pair of bodies nearer than the margin.
+            None: nothing is checked.
         mask: (6,) truth values: the rows (vx, vy, vz, ωx, ωy, ωz) that matter; None: all.
         frame: the axes of these rows, the base's or the tool's.
         """
@@ -885,6 +1099,11 @@ class Servo:
     @property
     def chain(self) -> Chain:
         ...
+    @property
+    def collisions(self) -> Collisions | None:
+        """
+        What the arm must not touch, or None.
+        """
     @property
     def dt(self) -> float:
         """

@@ -15,6 +15,10 @@
 
 namespace sigmaik {
 
+namespace detail {
+inline const std::string kNoText;
+}  // namespace detail
+
 /// Kind of a joint. A continuous joint turns without position limits; its positions are the same modulo 2π.
 enum class JointType { Fixed, Revolute, Continuous, Prismatic };
 
@@ -173,6 +177,8 @@ class Chain {
   const std::array<JointConstants, kMaxJoints>& constants() const noexcept { return model_->constants; }
   /// The tip in the last movable joint's frame, at any q.
   const Pose& tool() const noexcept { return model_->tool; }
+  /// The XML of the URDF that the chain was read from; empty where the chain was made in another way.
+  const std::string& urdf() const noexcept { return urdf_ != nullptr ? *urdf_ : detail::kNoText; }
 
  private:
   struct Model {
@@ -189,6 +195,7 @@ class Chain {
     Pose tool = Pose::Identity();
   };
   std::shared_ptr<const Model> model_;
+  std::shared_ptr<const std::string> urdf_;
 };
 
 SIGMAIK_SAME_LAYOUT(Chain, Inertia, Segment, JointLimits, JointConstants, Coupling);

@@ -80,6 +80,10 @@
 #include <sigmaik/layout.hpp>
 #include <sigmaik/types.hpp>
 
+namespace sigmaik::detail {
+class StopPath;
+}  // namespace sigmaik::detail
+
 namespace sigmaik {
 
 /// Selects the limits of a chain that a LimitTracker holds, and the least speed of a recovery.
@@ -246,6 +250,7 @@ class LimitTracker {
   const LimitOptions& options() const noexcept { return options_; }
 
  private:
+  friend class detail::StopPath;  // follows the stop after a command
   struct Window;
   // One number for each joint. Velocities keep their unit; all other quantities are in velocities and cycles: positions
   // [1/h], changes of velocity in a cycle, and changes of these changes, where h is the time of the coming cycle.

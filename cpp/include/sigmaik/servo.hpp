@@ -11,6 +11,7 @@
 
 #include <sigmaik/avoidance.hpp>
 #include <sigmaik/chain.hpp>
+#include <sigmaik/collisions.hpp>
 #include <sigmaik/kinematics.hpp>
 #include <sigmaik/layout.hpp>
 #include <sigmaik/least_squares.hpp>
@@ -21,20 +22,22 @@
 namespace sigmaik::detail {
 
 class Guide;
-// Owns a guide, which is copied with its servo.
-class GuideOwner {
+class CollisionGuard;
+// Owns a part of a servo, which is copied with its servo.
+template <typename T>
+class Owner {
  public:
-  GuideOwner() noexcept;
-  explicit GuideOwner(std::unique_ptr<Guide> guide) noexcept;
-  GuideOwner(const GuideOwner& other);
-  GuideOwner(GuideOwner&& other) noexcept;
-  GuideOwner& operator=(GuideOwner other) noexcept;
-  ~GuideOwner();
-  Guide* operator->() const noexcept { return guide_.get(); }
-  explicit operator bool() const noexcept { return guide_ != nullptr; }
+  Owner() noexcept;
+  explicit Owner(std::unique_ptr<T> owned) noexcept;
+  Owner(const Owner& other);
+  Owner(Owner&& other) noexcept;
+  Owner& operator=(Owner other) noexcept;
+  ~Owner();
+  T* operator->() const noexcept { return owned_.get(); }
+  explicit operator bool() const noexcept { return owned_ != nullptr; }
 
  private:
-  std::unique_ptr<Guide> guide_;
+  std::unique_ptr<T> owned_;
 };
 
 }  // namespace sigmaik::detail
@@ -99,6 +102,9 @@ struct ServoOptions {
   JointVector joint_weights{};
   /// Whether the servo takes another way to a pose target that rests where its own way does not arrive; see Servo.
   bool guided = false;
+  /// What the arm must not touch: no command brings a pair of bodies nearer than the margin; see collisions.hpp. None:
+  /// nothing is checked.
+  std::optional<Collisions> collisions{};
 };
 
 /// What the guide of a servo does (ServoOptions::guided), for the pose target at hand.
@@ -142,6 +148,13 @@ struct ServoStep {
   /// Bit i: by the way that the guide has taken, joint i ends more than 0.5 rad (prismatic: half of the characteristic
   /// length) from where the servo's own way leads.
   std::uint16_t guide_joints = 0;
+  /// [m] the least distance of all pairs of bodies after the step, below 0 in contact; infinite where nothing is
+  /// checked.
+  double clearance = std::numeric_limits<double>::infinity();
+  /// The pair of this distance, by the numbers of Collisions::body_names(); −1: none.
+  std::array<std::int16_t, 2> nearest{-1, -1};
+  /// Whether the step keeps clear of a body that the rule's answer would come too near to, or leads away from one.
+  bool limited_by_collisions = false;
 };
 
 /// Drives a chain's own reference configuration towards poses, or along twists. A servo integrates the command that it
@@ -354,6 +367,13 @@ class Servo {
   JointVector slowest(JointVector qdot, const VelocityBounds& bounds) const noexcept;
   void slow_tool(ServoStep& step) noexcept;
   void hold_tool_speed(ServoStep& step) noexcept;
+  // servo_collisions.cpp
+  void set_collisions();
+  void look_around(ServoStep* step, double dt) noexcept;
+  bool clears(const JointVector& qdot) noexcept;
+  void head_clear(const JointVector& asked, const VelocityBounds& heading, ServoStep& step) noexcept;
+  void add_clear_rows(const JointVector& begin) noexcept;
+  bool shield(const JointVector& asked, ServoStep& step) noexcept;
 
   // servo_redistribution.cpp
   JointVector redistribute(const JointVector& qdot, const VelocityBounds& bounds, ServoStep& step) noexcept;
@@ -386,8 +406,9 @@ class Servo {
   double max_linear_error_;
   double fade_ = 1.0, rested_ = 0.0;
   bool measured_ = false;
-  JointVector guided_posture_;  // the posture that the guide has given; empty: none
-  detail::GuideOwner guide_;    // null: not guided
+  JointVector guided_posture_;                   // the posture that the guide has given; empty: none
+  detail::Owner<detail::Guide> guide_;           // null: not guided
+  detail::Owner<detail::CollisionGuard> guard_;  // null: nothing is checked
 };
 
 SIGMAIK_SAME_LAYOUT(Servo, ServoOptions, ServoStep);

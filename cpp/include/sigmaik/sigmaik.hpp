@@ -25,6 +25,7 @@
 ///     indices.hpp          IndexFunction: manipulability, condition number, least singular value, geometry-aware index
 ///     singularities.hpp    SingularSets: known singular sets of three arms, potentials, manipulability in closed form
 ///     avoidance.hpp        Avoidance: a posture velocity away from singularities
+///     collisions.hpp       Collisions: an arm as capsules, Obstacle; what a servo keeps clear of
 ///     servo.hpp            Servo: pose or twist in, joint command out, each cycle
 ///     servo_batch.hpp      ServoBatch: many servos of one arm, a cycle of all of them in one call
 ///     target_stream.hpp    TargetStream: samples of a moving pose in, a smooth target out, each cycle
@@ -70,6 +71,7 @@
 #include <sigmaik/avoidance.hpp>
 #include <sigmaik/batch.hpp>
 #include <sigmaik/chain.hpp>
+#include <sigmaik/collisions.hpp>
 #include <sigmaik/computed_torque.hpp>
 #include <sigmaik/constrained_ik.hpp>
 #include <sigmaik/dynamics.hpp>

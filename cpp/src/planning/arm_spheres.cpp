@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "../finite.hpp"
+#include "../link_frames.hpp"
 #include "../link_shapes.hpp"
 #include "../message.hpp"
 #include "../walk.hpp"
@@ -93,27 +94,14 @@ ArmSpheres::ArmSpheres(const Chain& chain, std::vector<LinkSphere> spheres)
             " m must be finite and greater than 0");
   }
 
-  // At q = 0 the links' frames are products of the origins, and the joints' frames are products of the constants: the
-  // transform between the two does not depend on q.
-  std::vector<Pose> to_joint{Pose::Identity()};  // of the base, then of each segment
-  std::vector<int> moved{0};                     // number of joints that move each
-  Pose link = Pose::Identity(), joint = Pose::Identity();
-  for (const Segment& s : segments) {
-    link = link * s.origin;
-    if (s.type != JointType::Fixed) {
-      const JointConstants& c = chain.constants()[static_cast<std::size_t>(moved.back())];
-      joint.translate(c.translation).rotate(c.rotation);
-    }
-    moved.push_back(moved.back() + (s.type != JointType::Fixed ? 1 : 0));
-    to_joint.push_back(joint.inverse() * link);
-  }
+  const sigmaik::detail::LinkFrames frames(chain);
   std::stable_sort(spheres_.begin(), spheres_.end(),
                    [](const LinkSphere& a, const LinkSphere& b) { return a.segment < b.segment; });
   for (const LinkSphere& s : spheres_) {
     const std::size_t i = static_cast<std::size_t>(s.segment + 1);
-    local_.push_back(to_joint[i] * s.center);
-    joints_.push_back(moved[i]);
-    if (moved[i] == 0) ++first_moving_;
+    local_.push_back(frames.in_joint[i] * s.center);
+    joints_.push_back(frames.joints[i]);
+    if (frames.joints[i] == 0) ++first_moving_;
   }
 }
 
