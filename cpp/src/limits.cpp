@@ -411,12 +411,11 @@ LimitTracker::Window LimitTracker::jerk_window(int i, bool& broken) noexcept {
   if ((changing_ >> i & 1u) != 0) keep_even_stop(i);
   const double slack = kLimitTolerance * (1.0 + std::abs(q_[i])) * per_dt_;
   const double back = recovery(i, std::max({0.0, -above, -below}) * cycle_);
-  const detail::JerkBound up = detail::upper_bound(
-      {v, s.change, s.next, s.next_slope, above, slack, velocity_[at], acceleration, brake, jerk_[at], back, last_,
-       longest});
-  const detail::JerkBound down = detail::upper_bound(
-      {-v, -s.change, -s.next, -s.next_slope, below, slack, velocity_[at], acceleration, brake, jerk_[at], back, last_,
-       longest});
+  const detail::JerkBound up = detail::upper_bound({v, s.change, s.next, s.next_slope, above, slack, velocity_[at],
+                                                    acceleration, brake, jerk_[at], back, last_, longest});
+  const detail::JerkBound down = detail::upper_bound({-v, -s.change, -s.next, -s.next_slope, below, slack,
+                                                      velocity_[at], acceleration, brake, jerk_[at], back, last_,
+                                                      longest});
   // The way back from one limit does not break another.
   Window window{std::min(-down.bound, up.safe), std::max(up.bound, -down.safe), down.kind, up.kind};
   if (window.lower > window.upper) {

@@ -46,8 +46,8 @@ double LimitTracker::towards_unevenly(double room, double acceleration) const no
   return 2.0 * room / (1.0 + std::sqrt(1.0 + 4.0 * room / acceleration));
 }
 
-// A joint with a jerk limit whose stop was made for even cycles takes this stop's sample after dt, where the coming cycle
-// is shorter, or a later sample, until the samples of even cycles from there end inside.
+// A joint with a jerk limit whose stop was made for even cycles takes this stop's sample after dt, where the coming
+// cycle is shorter, or a later sample, until the samples of even cycles from there end inside.
 void LimitTracker::keep_even_stop(int i) noexcept {
   const auto at = static_cast<std::size_t>(i);
   JerkMemory& s = jerk_states_[at];
@@ -81,7 +81,7 @@ LimitTracker::Window LimitTracker::uneven_window(int i, bool& broken) noexcept {
   const double slack = detail::kLimitTolerance * (a + (1.0 + std::abs(q_[i])) * per_dt_);
   broken = std::abs(v) > limit || highest < window.lower - slack || lowest > window.upper + slack;
   if ((changing_ >> i & 1u) != 0) {
-    const double more = a * std::max(1.0, dt_ * per_dt_);  // what a cycle of dt takes
+    const double more = a * std::max(1.0, dt_ * per_dt_);            // what a cycle of dt takes
     const double brake = detail::braking(a), way = v * std::abs(v);  // Φ(v) ≤ room, whatever the coming cycle's time
     if (way <= brake * above && -way <= brake * below) changing_ &= ~(1u << i);
     if (highest < window.lower) window.lower = std::max(highest, v - more);

@@ -37,8 +37,9 @@
 /// a joint that would pass its wanted velocity brakes as hard as its own limits allow.
 ///
 /// *A clock that is not even* (set_cycle()). With h_k for the time of cycle k, q_k = q_{k−1} + v_k h_k, and the limits
-/// hold for q_k, v_k, a_k = (v_k − v_{k−1})/h_k and the jerk (a_k − a_{k−1})/m_k, where m_k = (h_k + h_{k−1})/2 is the time
-/// between the middles of two cycles. Without a jerk limit (v_k − v_{k−1})/m_k is within the acceleration limit, too:
+/// hold for q_k, v_k, a_k = (v_k − v_{k−1})/h_k and the jerk (a_k − a_{k−1})/m_k, where m_k = (h_k + h_{k−1})/2 is the
+/// time between the middles of two cycles. Without a jerk limit (v_k − v_{k−1})/m_k is within the acceleration limit,
+/// too:
 /// |v_k − v_{k−1}| ≤ A e with e = min(h_k, m_k) ≥ h_k/2. From the first cycle whose time is not dt, until reset(), the
 /// bounds are made for any times of the cycles to come.
 ///   - Without a jerk limit: v h + Φ(v) ≤ room with Φ(v) = v²/A, the way of half the acceleration. This can be held for
@@ -46,9 +47,9 @@
 ///   - With a jerk limit the way of the stop is ∫ v dt + H max(s, 0)²/2J, with the longest cycle H, in place of the sum
 ///     of its samples. A sum of samples at the ends of cycles is less than the integral while v falls, and more by at
 ///     most the longest cycle times the rise s²/2J.
-/// At the change from even cycles, a joint may just be braking towards a position limit by the sum of samples, for which
-/// shorter cycles come too late. Such a joint keeps its position limit: until the joint is inside the new bounds, it
-/// brakes by up to A max(h_k, h_{k−1}), with a jerk limit by what a cycle of dt takes.
+/// At the change from even cycles, a joint may just be braking towards a position limit by the sum of samples, for
+/// which shorter cycles come too late. Such a joint keeps its position limit: until the joint is inside the new bounds,
+/// it brakes by up to A max(h_k, h_{k−1}), with a jerk limit by what a cycle of dt takes.
 ///
 /// Where a limit is broken already (reset() outside it, or too fast to stop before it), acceleration and jerk are held
 /// first, because the motors can do no more, then velocity, then position: each of these comes back as fast as the
@@ -265,17 +266,17 @@ class LimitTracker {
   void keep_even_stop(int i) noexcept;
 
   LimitOptions options_;
-  double dt_;              // [s] as given
-  double cycle_, per_dt_;  // [s] h, [1/s] 1/h
-  double last_ = 1.0;      // [cycles], the time of the last cycle
-  bool uneven_ = false;    // since reset() a cycle had another time than dt
+  double dt_;                   // [s] as given
+  double cycle_, per_dt_;       // [s] h, [1/s] 1/h
+  double last_ = 1.0;           // [cycles], the time of the last cycle
+  bool uneven_ = false;         // since reset() a cycle had another time than dt
   std::uint32_t changing_ = 0;  // bit i: joint i still follows bounds of even cycles, see limits.hpp
   int n_ = 0;
-  Numbers lower_, upper_;  // [rad or m]
-  Numbers velocity_;       // V
-  Numbers acceleration_;   // A dt
-  Numbers jerk_;           // J dt²
-  Numbers recovery_;       // [rad/s or m/s], infinite without a velocity limit
+  Numbers lower_, upper_;                  // [rad or m]
+  Numbers velocity_;                       // V
+  Numbers acceleration_;                   // A dt
+  Numbers jerk_;                           // J dt²
+  Numbers recovery_;                       // [rad/s or m/s], infinite without a velocity limit
   Numbers most_acceleration_, most_jerk_;  // A and J, in s
   double settling_time_ = 0.0;
   std::uint32_t with_jerk_ = 0;  // bit i: joint i has a jerk limit
