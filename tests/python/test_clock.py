@@ -94,4 +94,4 @@ def test_a_clock_that_steps_makes_the_target_stale_at_once_and_tracked_again(ste
     assert back is not None
     assert back <= 300
     assert stream.counts.clock_steps == 1
-    assert abs(target.pose[0, 3] - pose[0, 3]) < 0.02
+    assert abs(target.pose[0, 3] - pose[0, 3]) < 0.05
