@@ -191,7 +191,8 @@ void bind_cycle(py::class_<Servo>& c) {
        "Behind\n"
        "    a target of constant twist the tip lags by speed/gain without it, and not at all with it.\n"
        "dt: [s] the time since the last call on the robot's clock, from a tenth to 20 times the servo's dt; None: the\n"
-       "    servo's dt. After a lost packet, or in a loop that is not even, the limits then hold against the clock: the\n"
+       "    servo's dt. After a lost packet, or in a loop that is not even, the limits then hold against the clock: "
+       "the\n"
        "    position command advances by q̇ dt, and q̇ changes by no more than the acceleration limit times dt.\n"
        "Raises Error, and holds, where the target is not a pose, or dt is outside its range.")
       .def(

@@ -59,8 +59,7 @@ void bind_statuses(py::module_& m) {
       .value("OUTLIER", SampleStatus::Outlier, "refused: too far from the last one for max_speed or max_angular_speed")
       .value("OUT_OF_ORDER", SampleStatus::OutOfOrder, "refused: its stamp is not later than the last one's")
       .value("INVALID", SampleStatus::Invalid, "refused: more than 10⁹ m away; what is not a pose raises")
-      .value("AHEAD", SampleStatus::Ahead,
-             "refused: its stamp is later than the time of at() by more than the timeout")
+      .value("AHEAD", SampleStatus::Ahead, "refused: its stamp is later than the time of at() by more than the timeout")
       .finalize();
 }
 

@@ -47,8 +47,8 @@ double LimitTracker::towards_unevenly(double room, double acceleration) const no
   return 2.0 * room / (1.0 + std::sqrt(1.0 + 4.0 * room / acceleration));
 }
 
-// A joint with a jerk limit whose stop was made for even cycles takes this stop's sample after dt, where the coming cycle
-// is shorter, or a later sample, until the samples of even cycles from there end inside.
+// A joint with a jerk limit whose stop was made for even cycles takes this stop's sample after dt, where the coming
+// cycle is shorter, or a later sample, until the samples of even cycles from there end inside.
 void LimitTracker::keep_even_stop(int i) noexcept {
   const auto at = static_cast<std::size_t>(i);
   JerkMemory& s = jerk_states_[at];

@@ -111,7 +111,8 @@ double Servo::tool_speed_part(const JointVector& qdot) const noexcept {
     const double a = braking_limit(i) * (tracker_.uneven() ? 0.5 : 1.0);
     if (qdot[i] != 0.0) time = std::max(time, std::abs(qdot[i]) / a);
     if (tracker_.has_jerk() && qdot[i] != 0.0) {
-      delay = std::max(delay, std::min(a / tracker_.jerk_limit(i), std::sqrt(std::abs(qdot[i]) / tracker_.jerk_limit(i))));
+      delay = std::max(delay,
+                       std::min(a / tracker_.jerk_limit(i), std::sqrt(std::abs(qdot[i]) / tracker_.jerk_limit(i))));
     }
   }
   double fastest = 0.0;
@@ -132,7 +133,8 @@ JointVector Servo::nearest_slow(const JointVector& slow, const JointVector& fast
   int side = 0;
   for (int k = 0; k < kEvaluations && b - a > kNear && fa < -kNear; ++k) {
     const double margin = 0.01 * (b - a), root = a + (b - a) * (fa / (fa - fb));
-    const double x = fb < kInfinity && root > a ? std::clamp(root - 0.5 * kNear, a + margin, b - margin) : 0.5 * (a + b);
+    const double x = fb < kInfinity && root > a ? std::clamp(root - 0.5 * kNear, a + margin, b - margin)
+                                                : 0.5 * (a + b);
     const JointVector at = slow + x * (fast - slow);
     const double fx = tool_speed_part(at) - 1.0;
     if (fx <= 0.0) {

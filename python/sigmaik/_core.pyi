@@ -983,6 +983,16 @@ class ServoStep:
         """
         What the cycle did, see Status.
         """
+    @property
+    def tool_speed(self) -> float:
+        """
+        [m/s] of the fastest checked point over the cycle; 0 without a max_tool_speed.
+        """
+    @property
+    def tool_speed_limits(self) -> bool:
+        """
+        max_tool_speed has slowed the motion down.
+        """
 class Servo:
     """
     Drives a chain's reference configuration towards poses, or along twists, one cycle a call.
@@ -1028,6 +1038,11 @@ class Servo:
             the tool.
         exact: (6,) truth values: the rows (vx, vy, vz, ωx, ωy, ωz) that come before the others in every
             cycle.
+        max_tool_speed: [m/s] > 0: no checked point of the arm (the tip's origin, the origin of each movable
+            joint's link, speed_points) moves faster in any cycle; the motion slows down along its
+            direction. 0.25 is the reduced speed of ISO 10218-1. inf: no such limit.
+        speed_points: (k, 3) [m] further points that max_tool_speed checks, in the tip's frame, k ≤ 8; None:
+            none.
         length_scale: [m] > 0: 1 rad/s weighs as much as length_scale m/s, as for VelocitySolver. None:
             chain.characteristic_length.
         joint_weights: (n,) > 0, how much each joint's motion counts where there are more joints than rows: a
@@ -1049,9 +1064,11 @@ class Servo:
 
         Rule and options are this one's; what it commands is faded in from the other's last velocity over soft_start.
         """
-    def hold(self) -> ServoStep:
+    def hold(self, dt: typing.SupportsFloat | typing.SupportsIndex | None = None) -> ServoStep:
         """
         One cycle of the fastest stop that the limits allow, or of rest: HOLDING.
+
+        dt: [s] the time since the last call, as for `update`.
         """
     def measure(self, q: numpy.typing.ArrayLike, qdot: numpy.typing.ArrayLike | None = None) -> None:
         """
@@ -1087,14 +1104,18 @@ class Servo:
 
         feedforward: (6,) twist [v; ω] of a target that moves, base axes, at its origin, added to gain × error. Behind
             a target of constant twist the tip lags by speed/gain without it, and not at all with it.
-        Raises Error, and holds, where the target is not a pose.
+        dt: [s] the time since the last call on the robot's clock, from a tenth to 20 times the servo's dt; None: the
+            servo's dt. After a lost packet, or in a loop that is not even, the limits then hold against the clock: the
+            position command advances by q̇ dt, and q̇ changes by no more than the acceleration limit times dt.
+        Raises Error, and holds, where the target is not a pose, or dt is outside its range.
         """
-    def update_twist(self, twist: numpy.typing.ArrayLike, frame: str = 'base', point: numpy.typing.ArrayLike | None = None) -> ServoStep:
+    def update_twist(self, twist: numpy.typing.ArrayLike, frame: str = 'base', point: numpy.typing.ArrayLike | None = None, dt: typing.SupportsFloat | typing.SupportsIndex | None = None) -> ServoStep:
         """
         One cycle along a twist (6,) [v; ω].
 
         frame: the axes of twist and point, 'base' or 'tool'; jog devices send 'tool'.
         point: (3,) [m] that moves at v: in base, or with frame='tool' from the tip's origin. None: the tip's origin.
+        dt: [s] the time since the last call, as for `update`.
         """
     @property
     def chain(self) -> Chain:
@@ -1581,6 +1602,7 @@ class SampleStatus(enum.IntEnum):
     What became of a sample.
     """
     ACCEPTED = ...
+    AHEAD = ...
     INVALID = ...
     OUTLIER = ...
     OUT_OF_ORDER = ...
@@ -1595,6 +1617,16 @@ class SampleCounts:
     def accepted(self) -> int:
         """
         Relocated ones included.
+        """
+    @property
+    def ahead(self) -> int:
+        """
+        Samples whose stamp was ahead of the clock of at().
+        """
+    @property
+    def clock_steps(self) -> int:
+        """
+        Steps of the clock of at(), and of the stamps against this clock.
         """
     @property
     def invalid(self) -> int:
@@ -1673,7 +1705,8 @@ class TargetStream:
         ...
     def at(self, time: typing.SupportsFloat | typing.SupportsIndex) -> Target:
         """
-        The target at a time [s] not before that of the last call; else the last one again.
+        The target at a time [s]. Where the clock steps, back or forth, the target holds still: STALE, twist zero;
+        samples of the new clock lead on from there.
         """
     def push(self, time: typing.SupportsFloat | typing.SupportsIndex, pose: typing.Any) -> SampleStatus:
         """

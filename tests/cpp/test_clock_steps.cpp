@@ -45,7 +45,8 @@ struct Rig {
     const Target before = target;
     target = stream.at(now + clock);
     const double way = (target.pose.translation() - before.pose.translation()).norm();
-    const double elapsed = target.status == StreamStatus::Stale ? kCycle : std::max(kCycle, kCycle + clock - last_clock);
+    const double elapsed = target.status == StreamStatus::Stale ? kCycle
+                                                                : std::max(kCycle, kCycle + clock - last_clock);
     last_clock = clock;
     if (before.status < StreamStatus::Stale) fastest = std::max(fastest, way / elapsed);
     least_age = std::min(least_age, target.age);
@@ -66,7 +67,8 @@ struct Rig {
   TargetStream stream;
   Target target;
   SampleStatus last = SampleStatus::Accepted;
-  double every, now = 100.0, next = 100.0, clock = 0.0, stamps = 0.0, last_clock = 0.0, fastest = 0.0, least_age = 0.0, fed = 0.0;
+  double every, now = 100.0, next = 100.0, clock = 0.0, stamps = 0.0, last_clock = 0.0, fastest = 0.0, least_age = 0.0,
+                fed = 0.0;
 };
 
 // The tip is where the samples are, but for the delay and the smoothing of the mode.
@@ -173,7 +175,8 @@ TEST_CASE("a time that is not finite: the target holds still for this call alone
     Rig rig(mode), other(mode);
     rig.run(1.0);
     other.run(1.0);
-    for (const double time : {kNan, std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()}) {
+    for (const double time :
+         {kNan, std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()}) {
       const Target held = rig.stream.at(time);
       CHECK(held.status == StreamStatus::Stale);
       CHECK(held.twist.isZero(0.0));
@@ -202,7 +205,8 @@ TEST_CASE("no clock has stepped: late samples, bursts, pauses of the loop and tw
     CHECK(again.twist == rig.target.twist);
     CHECK(again.status == rig.target.status);
     // The loop pauses while samples come: they count at once.
-    for (int i = 1; i < 100; ++i) CHECK(rig.stream.push(rig.now + 0.02 * i, sine(rig.now + 0.02 * i)) == SampleStatus::Accepted);
+    for (int i = 1; i < 100; ++i)
+      CHECK(rig.stream.push(rig.now + 0.02 * i, sine(rig.now + 0.02 * i)) == SampleStatus::Accepted);
     CHECK(rig.stream.counts().clock_steps == steps);
     // A loop of 2 Hz: only its beginning can be taken for a step.
     TargetStreamOptions options;

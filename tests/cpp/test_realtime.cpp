@@ -113,6 +113,8 @@ TEST_CASE("servos and constrained inverse kinematics with limits active pass Eig
         options.on_limit = on_limit;
         options.task.frame = frame;
         if (frame == sigmaik::Frame::Tool) options.exact = {true, true, false, false, false, true};
+        if (frame == sigmaik::Frame::Tool) options.max_tool_speed = 0.1;
+        options.speed_points.setConstant(3, 2, 0.1);
         sigmaik::Servo servo(chain, sigmaik::JParse{}, options);
         servo.reset(zero, moving);
         double sum = 0.0;
@@ -122,6 +124,7 @@ TEST_CASE("servos and constrained inverse kinematics with limits active pass Eig
             sum += servo.update(target).qdot.sum() + servo.update_twist(twist).qdot.sum();
             if (cycle > 50) sum += servo.measure(moving, zero) + servo.update(target, twist).qdot.sum();
             if (cycle % 30 == 29) sum += servo.update(wrong).qdot.sum();
+            if (cycle > 70) sum += servo.update_twist(twist, cycle % 2 == 0 ? 3e-3 : 4e-4).qdot.sum();
           }
         }
         CHECK(std::isfinite(sum));

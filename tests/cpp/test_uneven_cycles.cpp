@@ -68,9 +68,9 @@ class ClockWatch {
 double part(Random& random, int kind) {
   switch (kind) {
     case 0: return random.decades(-1.0, std::log10(20.0) - 1e-12);  // anything
-    case 1: return random.uniform(0.7, 1.6);                       // a loop without real time
-    case 2: return random.chance(0.02) ? 2.0 : 1.0;                // a lost packet
-    case 3: return random.chance(0.5) ? 0.1 : 20.0;                // the ends of the range
+    case 1: return random.uniform(0.7, 1.6);                        // a loop without real time
+    case 2: return random.chance(0.02) ? 2.0 : 1.0;                 // a lost packet
+    case 3: return random.chance(0.5) ? 0.1 : 20.0;                 // the ends of the range
     default: return random.chance(0.3) ? random.uniform(1.0, 4.0) : 1.0;
   }
 }
@@ -120,7 +120,7 @@ TEST_CASE("position limits hold for any choice inside the bounds and any times o
         CHECK(watch.velocity <= 1.0 + 1e-9);
         position = std::max(position, watch.position);
         (kind == 2 || kind == 4 ? lost : acceleration) = std::max(kind == 2 || kind == 4 ? lost : acceleration,
-                                                                 watch.acceleration);
+                                                                  watch.acceleration);
         between_middles = std::max(between_middles, watch.between_middles);
         jerks = std::max(jerks, watch.jerk);
       }
@@ -140,7 +140,8 @@ TEST_CASE("position limits hold for any choice inside the bounds and any times o
   }
 }
 
-TEST_CASE("lost packets and a loop without real time: 1.0 of the limits against the clock, with the time of each cycle") {
+TEST_CASE(
+    "lost packets and a loop without real time: 1.0 of the limits against the clock, with the time of each cycle") {
   for (const bool told : {true, false}) {
     double acceleration = 0.0, between_middles = 0.0, position = 0.0, velocity = 0.0;
     for (unsigned seed = 0; seed < 40; ++seed) {

@@ -51,8 +51,9 @@
 /// a joint that would pass its wanted velocity brakes as hard as its own limits allow.
 ///
 /// *A clock that is not even* (set_cycle()). With h_k for the time of cycle k, q_k = q_{k−1} + v_k h_k, and the limits
-/// hold for q_k, v_k, a_k = (v_k − v_{k−1})/h_k and the jerk (a_k − a_{k−1})/m_k, where m_k = (h_k + h_{k−1})/2 is the time
-/// between the middles of two cycles. Without a jerk limit (v_k − v_{k−1})/m_k is within the acceleration limit, too:
+/// hold for q_k, v_k, a_k = (v_k − v_{k−1})/h_k and the jerk (a_k − a_{k−1})/m_k, where m_k = (h_k + h_{k−1})/2 is the
+/// time between the middles of two cycles. Without a jerk limit (v_k − v_{k−1})/m_k is within the acceleration limit,
+/// too:
 /// |v_k − v_{k−1}| ≤ A e with e = min(h_k, m_k) ≥ h_k/2. From the first cycle whose time is not dt, until reset(), the
 /// bounds are made for any times of the cycles to come.
 ///   - Without a jerk limit: v h + Φ(v) ≤ room with Φ(v) = v²/A, the way of half the acceleration. This can be held for
@@ -294,10 +295,10 @@ class LimitTracker {
   void keep_even_stop(int i) noexcept;
 
   LimitOptions options_;
-  double dt_;              // [s] as given
-  double cycle_, per_dt_;  // [s] h, [1/s] 1/h
-  double last_ = 1.0;      // [cycles], the time of the last cycle
-  bool uneven_ = false;    // since reset() a cycle had another time than dt
+  double dt_;                   // [s] as given
+  double cycle_, per_dt_;       // [s] h, [1/s] 1/h
+  double last_ = 1.0;           // [cycles], the time of the last cycle
+  bool uneven_ = false;         // since reset() a cycle had another time than dt
   std::uint32_t changing_ = 0;  // bit i: joint i still follows bounds of even cycles, see limits.hpp
   int n_ = 0;
   Numbers lower_, upper_;  // [rad or m]

@@ -133,7 +133,7 @@ struct ServoStep {
   double scale = 1.0;
   std::uint16_t limiting_joints = 0;  ///< bit i: joint i is held at a limit that the rule's answer would break
   bool tool_speed_limits = false;     ///< max_tool_speed has slowed the motion down
-  double tool_speed = 0.0;  ///< [m/s] of the fastest checked point over the cycle; 0 without a max_tool_speed
+  double tool_speed = 0.0;            ///< [m/s] of the fastest checked point over the cycle; 0 without a max_tool_speed
   TaskVector singular_values;         ///< of the weighted task Jacobian, from large to small; empty while holding
   std::uint8_t singular = 0;          ///< bit i: direction i is singular to the rule, i from 0 to task_rows − 1
   int task_rows = 0;                  ///< m', the number of directions

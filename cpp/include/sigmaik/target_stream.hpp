@@ -126,8 +126,9 @@ struct Target {
 /// u = (D + 2D²/k + D³/k²) x is longer than V is followed late: among these are fades shorter than 1.8 τ from the
 /// largest speed, and interpolated samples that noise moves apart.
 ///
-/// *Clocks that step.* A clock may be set while the arm moves. As soon as at() sees a step, the target holds still where
-/// it is: its twist is zero and its status Stale; from there it goes on smoothly with the samples of the new clock.
+/// *Clocks that step.* A clock may be set while the arm moves. As soon as at() sees a step, the target holds still
+/// where it is: its twist is zero and its status Stale; from there it goes on smoothly with the samples of the new
+/// clock.
 ///   - The time of at() is before that of the last call, by more than 5 ms (less is two threads that read the clock in
 ///     turn, and gets the last target again). Samples that are later than the new time belong to the old clock, and are
 ///     forgotten. Any time before counts as a step, also after one wrong time far ahead.
