@@ -301,7 +301,8 @@ double Guide::travel_time(const JointVector& from) const noexcept {
   double longest = 0.0;
   for (int i = 0; i < from.size(); ++i) {
     const double way = std::abs(goal_[i] - from[i]);
-    const double v = predictor_.tracker_.velocity_limit(i), a = predictor_.tracker_.acceleration_limit(i);
+    const double v = predictor_.tracker_.velocity_limit(i), up = predictor_.tracker_.acceleration_limit(i);
+    const double down = predictor_.tracker_.deceleration_limit(i), a = up == down ? up : 2.0 / (1.0 / up + 1.0 / down);
     longest = std::max(longest, way > v * v / a ? way / v + v / a : 2.0 * std::sqrt(way / a));
   }
   return longest;

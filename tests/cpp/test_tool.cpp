@@ -157,26 +157,41 @@ TEST_CASE("a guided servo changes its branch to where the tool is at the target"
 }
 
 TEST_CASE("a loop takes the tool with the next cycle; the command at hand is then the tool's") {
-  Servo start = test::started();
+  constexpr double kDt = 5e-3;
+  Servo start = test::started(10.0, {}, kDt);
   const Pose tip = start.tip();
-  ServoLoop loop(std::move(start));
+  ServoLoop loop(std::move(start), {}, {.max_missed = 1000000});  // busy machines leave cycles out
+  std::vector<LoopSample> samples;
+  const auto arrives = [&](const Pose& target) {
+    return test::until([&] {
+      const std::vector<LoopSample> more = test::read_all(loop);
+      samples.insert(samples.end(), more.begin(), more.end());
+      return !samples.empty() && (samples.back().tip.translation() - target.translation()).norm() < 1e-3 &&
+             samples.back().step.qdot.cwiseAbs().maxCoeff() < 1e-2;
+    });
+  };
   loop.start();
-  loop.follow(tip, 30.0);
-  REQUIRE(test::until([&] { return loop.statistics().cycles > 20; }));
+  loop.follow(tip, 50.0);
   const Pose tool = tool_of(0.0, 0.0, 0.15);
+  REQUIRE(arrives(tip));
+  const std::size_t before = samples.size();
   loop.set_tool(tool);
-  REQUIRE(test::until([&] { return loop.statistics().cycles > 1500; }));
-  const std::vector<LoopSample> samples = test::read_all(loop);
-  REQUIRE(!samples.empty());
-  CHECK(test::hardest(samples) <= 10.0 * 1e-3 * (1.0 + 1e-9));
-  CHECK((samples.back().tip.translation() - tip.translation()).norm() < 1e-3);
+  REQUIRE(test::until([&] {
+    const std::vector<LoopSample> more = test::read_all(loop);
+    samples.insert(samples.end(), more.begin(), more.end());
+    return samples.size() > before && (samples.back().tip.translation() - tip.translation()).norm() > 0.05;
+  }));
+  REQUIRE(arrives(tip));
+  CHECK(test::hardest(samples) <= 10.0 * kDt * (1.0 + 1e-9));
   // Another servo keeps the loop's tool.
-  Servo next = test::started();
-  loop.configure(std::move(next));
-  loop.follow(tip, 30.0);
-  const auto more = loop.statistics().cycles + 200;
-  REQUIRE(test::until([&] { return loop.statistics().cycles > more; }));
-  CHECK((test::read_all(loop).back().tip.translation() - tip.translation()).norm() < 2e-3);
+  const int number = loop.configure(test::started(10.0, {}, kDt));
+  loop.follow(tip, 50.0);
+  REQUIRE(test::until([&] {
+    const std::vector<LoopSample> more = test::read_all(loop);
+    samples.insert(samples.end(), more.begin(), more.end());
+    return samples.back().configuration == number;
+  }));
+  CHECK((samples.back().tip.translation() - tip.translation()).norm() < 2e-3);
   Pose bad = Pose::Identity();
   bad.linear() *= 2.0;
   CHECK(test::refused([&] { loop.set_tool(bad); }));
