@@ -5,7 +5,7 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
-#include <system_error>
+#include <exception>
 #include <thread>
 #include <vector>
 
@@ -21,7 +21,7 @@ class WorkerPool {
     threads_.reserve(workers - 1);
     try {
       for (std::size_t w = 1; w < workers; ++w) threads_.emplace_back([this, w] { serve(w); });
-    } catch (const std::system_error&) {  // the system gives no more threads
+    } catch (const std::exception&) {  // the system gives no more threads, or no memory for them
     }
   }
   WorkerPool(const WorkerPool&) = delete;

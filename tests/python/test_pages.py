@@ -6,7 +6,17 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGES = [page for page in ("README.md", "docs/getting-started.md", "docs/position_ik.md") if (ROOT / page).exists()]
+PAGES = [
+    page
+    for page in (
+        "README.md",
+        "docs/getting-started.md",
+        "docs/position_ik.md",
+        "docs/batches.md",
+        "docs/action_chunks.md",
+    )
+    if (ROOT / page).exists()
+]
 
 
 def blocks(page: str) -> list[tuple[int, str]]:
