@@ -103,6 +103,8 @@ struct Fields<ServoOptions> {
             "whether the servo takes another way to a pose target that rests where its own way does not arrive: "
             "through another configuration of the arm, if need be away from the tool's straight line. `step.guide` "
             "says so. Arrives at each target that PositionIk finds."),
+      field("strict", &ServoOptions::strict,
+            "whether `update` raises Error for a target that is no pose, in place of BAD_INPUT and a stop."),
       nested(&ServoOptions::task),
   };
 };

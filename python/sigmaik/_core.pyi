@@ -1115,6 +1115,11 @@ class ServoLoop:
         [s]
         """
     @property
+    def halted(self) -> bool:
+        """
+        Whether the latch of halt(), or of a fault, is closed: also while no thread runs.
+        """
+    @property
     def fault(self) -> LoopFault | None:
         """
         The fault that stopped the arm, until acknowledge(); or None.

@@ -194,6 +194,7 @@ class LimitTracker {
   const LimitOptions& options() const noexcept { return options_; }
 
  private:
+  friend struct detail::Members<LimitTracker>;
   struct Window;
   // One number for each joint. Velocities keep their unit; all other quantities are in velocities and cycles: positions
   // [1/dt], changes of velocity in a cycle, and changes of these changes.

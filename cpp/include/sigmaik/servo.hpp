@@ -86,6 +86,9 @@ struct ServoOptions {
   Task task{};                           ///< which rows of the twist matter, and in which axes
   /// Whether the servo takes another way to a pose target that rests where its own way does not arrive; see Servo.
   bool guided = false;
+  /// In Python: whether update() raises an Error for a target that is no pose, in place of BadInput and a stop. C++
+  /// never throws in the loop.
+  bool strict = false;
 };
 
 /// What the guide of a servo does (ServoOptions::guided), for the pose target at hand.
@@ -252,6 +255,7 @@ class Servo {
 
  private:
   friend class detail::Guide;  // predicts with a servo of its own
+  friend struct detail::Members<Servo>;
   void begin(const JointRef& posture) noexcept;
   ServoStep stop(Status status) noexcept;
   ServoStep resolve(const Twist& twist, const Twist* feedforward, bool fade, const JointVector* goal) noexcept;

@@ -51,6 +51,7 @@ class Spectrum {
   int sweeps() const noexcept { return sweeps_; }
 
  private:
+  friend struct detail::Members<Spectrum>;
   template <int kPadded>
   void decompose_padded(const TaskJacobianRef& jacobian) noexcept;
 
