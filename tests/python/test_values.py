@@ -1,7 +1,6 @@
 """Objects as values: ==, hash, copies and pickles, also in other processes; pickles that are no pickles of ours."""
 
 import concurrent.futures
-import contextlib
 import copy
 import multiprocessing
 import pickle
@@ -75,8 +74,8 @@ def values():
         torque,
         torque.update(home, 0 * home, home, 0 * home, 0 * home),
         sk.ServoLoop(started(chain)).statistics,
-        sk.singularities.load(ARM),
-        *(method() for method in sk.methods.ALL.values()),
+        sk.singularities.load("franka_panda"),
+        *map(sk.methods.parse, sk.methods.ALL),
     ]
     return {type(one).__name__: one for one in all_of_them}
 
@@ -176,7 +175,7 @@ def test_a_servo_in_another_process_goes_on_bit_by_bit(options, jerk, pool):
     target = chain.pose(chain.random_configuration(rng))
     for _ in range(150):
         servo.update(target)
-    there = pool.submit(goes_on, servo, target)
+    there = pool.submit(goes_on, copy.copy(servo), target)  # a thread pickles it later
     here = goes_on(servo, target)
     for one, other in zip(here, there.result(60.0), strict=True):
         np.testing.assert_array_equal(one.q, other.q)
@@ -253,16 +252,16 @@ def test_a_malformed_state_is_refused(name):
         type(one).__new__(type(one)).__setstate__((2, *state[1:]))
 
 
-def test_bytes_of_random_changes_never_end_the_program():
+def test_bytes_of_random_changes_are_refused():
     rng = np.random.default_rng(2)
     servo = started(sk.robots.load(ARM), guided=True)
-    data = bytearray(pickle.dumps(servo))
-    at = data.index(b"sigK")  # inside, the pickle module itself has no say
+    data, state = pickle.dumps(servo), servo.__getstate__()[-1]
+    at = data.index(state)
     for _ in range(300):
-        bad = data.copy()
-        bad[rng.integers(at, len(bad) - 20)] ^= 1 << rng.integers(8)
-        with contextlib.suppress(ValueError, TypeError, pickle.UnpicklingError, EOFError, UnicodeError, LookupError):
-            pickle.loads(bytes(bad)).hold()
+        bad = bytearray(data)
+        bad[at + rng.integers(len(state))] ^= 1 << rng.integers(8)
+        with pytest.raises(sk.Error, match="the bytes of a value are refused"):
+            pickle.loads(bytes(bad))
 
 
 def test_options_of_a_later_version_are_refused():

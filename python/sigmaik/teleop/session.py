@@ -102,7 +102,7 @@ class Session:
             if self._loop.fault is not None:
                 self._loop.acknowledge()
                 if not self._why_stopped:
-                    self._loop.release(self._token)
+                    self._loop.release(*self._tokens())
             self._hold("no command yet")
             self._loop.start()
             return self
@@ -211,7 +211,7 @@ class Session:
                 return False
             if self._loop.fault is not None:
                 self._loop.acknowledge()
-            self._loop.release(self._token)
+            self._loop.release(*self._tokens())
             self._why_stopped = ""
             self._hold("the stop was released; no command yet")
             return True
@@ -228,6 +228,10 @@ class Session:
     def why_it_holds(self) -> str:
         """Why the arm holds, where it holds."""
         return self.stopped or self._why_it_holds
+
+    def _tokens(self) -> tuple[sk.LoopToken, ...]:
+        """The owner's token; none where nobody owns the arm."""
+        return () if self._token is None else (self._token,)
 
     def _refuse_if_stopped(self) -> None:
         if self.stopped:

@@ -83,8 +83,9 @@ def run(experiment: StressExperiment, progress: Progress) -> list[CountRow]:
 
 def report(experiment: StressExperiment, rows: list[CountRow]) -> Report:
     sums = totals(rows)
-    table = Table("counts of each property", "property")
-    table.add_column("of")
+    table = Table("counts of each property")
+    table.add_column("property", wrap=True)
+    table.add_column("of", wrap=True)
     table.add_numbers("cases", "failed", "worst")
     for total in sums:
         table.add_row(total.property, total.of, str(total.cases), str(total.failed), f"{total.worst:.4g}")
