@@ -87,7 +87,7 @@ Eigen::Vector3d vector_argument(py::handle object, const char* what) {
   return Eigen::Map<const Eigen::Vector3d>(array_argument(object, what, {3}, "(3,)").data());
 }
 
-Pose pose_argument(py::handle object, const char* what) {
+Pose target_argument(py::handle object, const char* what) {
   py::object matrix = py::reinterpret_borrow<py::object>(object);
   if (!py::isinstance<py::array>(object)) {
     if (py::hasattr(object, "homogeneous")) {
@@ -99,7 +99,14 @@ Pose pose_argument(py::handle object, const char* what) {
     }
   }
   const Array array = array_argument(matrix, what, {4, 4}, "(4, 4)");
-  const Eigen::Matrix4d m = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(array.data());
+  Pose pose;
+  pose.matrix() = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(array.data());
+  return pose;
+}
+
+Pose pose_argument(py::handle object, const char* what) {
+  const Pose pose = target_argument(object, what);
+  const Eigen::Matrix4d m = pose.matrix();
   if (!is_pose(m)) {
     if (m.row(3) != Eigen::RowVector4d(0.0, 0.0, 0.0, 1.0)) {
       throw Error(std::string(what) + " is not a pose: its last row must be 0 0 0 1");
@@ -110,8 +117,6 @@ Pose pose_argument(py::handle object, const char* what) {
                 py::str(py::float_(defect)).cast<std::string>() + ", determinant " +
                 py::str(py::float_(r.determinant())).cast<std::string>() + ")");
   }
-  Pose pose;
-  pose.matrix() = m;
   return pose;
 }
 

@@ -72,6 +72,9 @@ Eigen::Vector3d vector_argument(py::handle object, const char* what);
 /// (.as_matrix()).
 Pose pose_argument(py::handle object, const char* what);
 
+/// The same, but a finite 4×4 matrix that is no pose is taken as it is: the cycle refuses it with a status.
+Pose target_argument(py::handle object, const char* what);
+
 /// 3×3, checked to be a rotation.
 Eigen::Matrix3d rotation_argument(py::handle object, const char* what);
 

@@ -1,4 +1,4 @@
-#include "arguments.hpp"
+#include "values.hpp"
 
 namespace sigmaik::bindings {
 namespace {
@@ -48,6 +48,15 @@ void bind_branch(py::module_& m) {
                ", within_limits=" + (b.within_limits ? "True" : "False") +
                ", singular=" + py::str(singular_names(b.singular)).cast<std::string>() + ")";
       });
+  def_value(bound<AnalyticBranch>(m, "AnalyticBranch"));
+}
+
+void bind_value(py::class_<AnalyticIk> c) {
+  def_pickle(
+      c, 1, [](const AnalyticIk& ik) { return py::make_tuple(ik.chain()); },
+      [](const py::tuple& s) { return AnalyticIk(s[0].cast<const Chain&>()); },
+      [](const AnalyticIk& a, const AnalyticIk& b) { return same(a.chain(), b.chain()); });
+  def_hash_by_chain(c);
 }
 
 void bind_inverse(py::module_& m) {
@@ -70,7 +79,8 @@ void bind_inverse(py::module_& m) {
           py::arg("pose"), py::kw_only(), py::arg("within_limits") = false,
           "Every posture (k, 6) [rad] of `pose` (4, 4), tip in base: k ≤ 8, and 0 where it is out of reach.\n\n"
           "within_limits: leave out postures beyond a joint limit.\n\n"
-          "Each joint is on the turn nearest to 0 within its limits, in (−π, π] where there is none. Branches that\n"
+          "Each joint is on the turn nearest to 0 within its limits, in (−π, π] where there is none. Branches "
+          "that\n"
           "are one at a singularity are given once; an angle that is free there is as close to 0 as limits allow.")
       .def(
           "branches",
@@ -81,9 +91,11 @@ void bind_inverse(py::module_& m) {
           py::arg("pose"), py::kw_only(), py::arg("within_limits") = false,
           "The postures of solve() in the same order, each with its limits and singularities.")
       .def("nearest", &nearest, py::arg("pose"), py::arg("q"), py::kw_only(), py::arg("within_limits") = false,
-           "The posture (6,) [rad] of `pose` (4, 4) nearest to q (6,) by Euclidean norm; None where out of reach.\n\n"
+           "The posture (6,) [rad] of `pose` (4, 4) nearest to q (6,) by Euclidean norm; None where out of "
+           "reach.\n\n"
            "One within the joint limits where there is one. within_limits: None where there is not.\n\n"
-           "Each joint is on the turn nearest to q within its limits. An angle that is free at a singularity stays as\n"
+           "Each joint is on the turn nearest to q within its limits. An angle that is free at a singularity stays "
+           "as\n"
            "in q, so that a path straight through is followed.")
       .def(
           "singular",
@@ -94,11 +106,13 @@ void bind_inverse(py::module_& m) {
             return singular_names(bits);
           },
           py::arg("pose"),
-          "Those of 'shoulder', 'elbow', 'wrist' that any posture of `pose` (4, 4) is singular by; branches() tells\n"
+          "Those of 'shoulder', 'elbow', 'wrist' that any posture of `pose` (4, 4) is singular by; branches() "
+          "tells\n"
           "which posture.")
       .def_property_readonly("chain", &AnalyticIk::chain, "The arm.")
       .def("__repr__",
            [](const AnalyticIk& ik) { return "AnalyticIk('" + ik.chain().base() + "' → '" + ik.chain().tip() + "')"; });
+  bind_value(bound<AnalyticIk>(m, "AnalyticIk"));
 }
 
 }  // namespace

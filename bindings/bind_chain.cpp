@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "arguments.hpp"
+#include "values.hpp"
 
 namespace sigmaik::bindings {
 namespace {
@@ -64,6 +64,7 @@ void bind_limits(py::module_& m) {
         }
         return text.str() + ")";
       });
+  def_value(bound<JointLimits>(m, "JointLimits"));
 }
 
 void bind_inertia(py::module_& m) {
@@ -92,6 +93,7 @@ void bind_inertia(py::module_& m) {
           "(3, 3) [kg·m²], about the centre of mass, in the link's axes")
       .def("__repr__",
            [](const Inertia& i) { return "Inertia(" + py::repr(py::float_(i.mass)).cast<std::string>() + " kg)"; });
+  def_value(bound<Inertia>(m, "Inertia"));
 }
 
 void bind_segment(py::module_& m) {
@@ -121,6 +123,7 @@ void bind_segment(py::module_& m) {
       .def("__repr__", [](const Segment& s) {
         return "Segment('" + s.joint_name + "' carries '" + s.link_name + "', " + to_string(s.type) + ")";
       });
+  def_value(bound<Segment>(m, "Segment"));
 }
 
 void bind_from_urdf(py::class_<Chain>& cls) {
@@ -287,6 +290,7 @@ void bind_chain(py::module_& m) {
   bind_from_urdf(cls);
   bind_parts(cls);
   bind_kinematics(cls);
+  def_value(cls);
   cls.def("__repr__", [](const Chain& c) {
     return "Chain('" + c.base() + "' → '" + c.tip() + "', " + std::to_string(c.dof()) + " joints)";
   });

@@ -1,6 +1,7 @@
 #include <sigmaik/constrained_ik.hpp>
 
 #include "servo_options.hpp"
+#include "values.hpp"
 
 namespace sigmaik::bindings {
 
@@ -29,6 +30,8 @@ struct Fields<ConstrainedIkOptions> {
       nested(&ConstrainedIkOptions::task),
       field("gravity", &ConstrainedIkOptions::gravity, "(3,) [m/s²] in base axes, for torque_limits."),
       nested(&ConstrainedIkOptions::limits),
+      field("strict", &ConstrainedIkOptions::strict,
+            "whether `update` raises Error for a target that is no pose, in place of BAD_INPUT and a stop."),
   };
 };
 
@@ -40,7 +43,7 @@ void require_started(const ConstrainedIk& ik) {
 
 ConstrainedIkStep update(ConstrainedIk& ik, const py::object& target) {
   require_started(ik);
-  return ik.update(pose_argument(target, "target"));
+  return ik.update(ik.options().strict ? pose_argument(target, "target") : target_argument(target, "target"));
 }
 
 // This getter throws until the first reset: nothing stands anywhere before.
@@ -86,6 +89,7 @@ void bind_step(py::module_& m) {
         return std::string("ConstrainedIkStep(status=") + to_string(s.status) + ", used=" + to_string(s.used) +
                ", qdot=" + py::str(to_numpy(s.qdot)).cast<std::string>() + ")";
       });
+  def_value(bound<ConstrainedIkStep>(m, "ConstrainedIkStep"));
 }
 
 void bind_setup(py::class_<ConstrainedIk>& c) {
@@ -137,6 +141,17 @@ void bind_state(py::class_<ConstrainedIk>& c) {
       });
 }
 
+void bind_value(py::class_<ConstrainedIk>& c) {
+  def_state(
+      c, 2, [](const ConstrainedIk& ik) { return py::make_tuple(ik.chain(), to_dict(ik.options())); },
+      [](const py::tuple& s) {
+        return ConstrainedIk(s[0].cast<const Chain&>(), from_dict<ConstrainedIkOptions>(s[1].cast<py::dict>()));
+      },
+      [](const ConstrainedIk& a, const ConstrainedIk& b) {
+        return same(a.chain(), b.chain()) && equal(a.options(), b.options());
+      });
+}
+
 }  // namespace
 
 void bind_constrained_ik(py::module_& m) {
@@ -148,6 +163,7 @@ void bind_constrained_ik(py::module_& m) {
   bind_setup(c);
   bind_cycle(c);
   bind_state(c);
+  bind_value(c);
 }
 
 }  // namespace sigmaik::bindings

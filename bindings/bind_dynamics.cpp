@@ -1,6 +1,6 @@
 #include <sigmaik/computed_torque.hpp>
 
-#include "fields.hpp"
+#include "values.hpp"
 
 namespace sigmaik::bindings {
 
@@ -20,6 +20,34 @@ namespace {
 
 Eigen::Vector3d gravity_argument(const MaybeArray& gravity, const Eigen::Vector3d& otherwise) {
   return gravity ? vector_argument(*gravity, "gravity") : otherwise;
+}
+
+void bind_value(py::class_<Dynamics> c) {
+  def_pickle(
+      c, 3,
+      [](const Dynamics& d) {
+        return py::make_tuple(d.chain(), to_numpy(d.gravity()), Argument<std::optional<Inertia>>::to(d.payload()));
+      },
+      [](const py::tuple& s) {
+        return Dynamics(s[0].cast<const Chain&>(), vector_argument(py::object(s[1]), "gravity"),
+                        s[2].cast<std::optional<Inertia>>());
+      },
+      [](const Dynamics& a, const Dynamics& b) {
+        return same(a.chain(), b.chain()) && equal(a.gravity(), b.gravity()) && equal(a.payload(), b.payload());
+      });
+  def_hash_by_chain(c);
+}
+
+void bind_value(py::class_<ComputedTorque> c) {
+  def_pickle(
+      c, 2, [](const ComputedTorque& t) { return py::make_tuple(t.chain(), to_dict(t.options())); },
+      [](const py::tuple& s) {
+        return ComputedTorque(s[0].cast<const Chain&>(), from_dict<ComputedTorqueOptions>(s[1].cast<py::dict>()));
+      },
+      [](const ComputedTorque& a, const ComputedTorque& b) {
+        return same(a.chain(), b.chain()) && equal(a.options(), b.options());
+      });
+  def_hash_by_chain(c);
 }
 
 void bind_rigid_body(py::module_& m) {
@@ -76,6 +104,7 @@ void bind_rigid_body(py::module_& m) {
           "q̈ = M⁻¹ (τ − C q̇ − g) (n,) [rad/s² or m/s²] at q, q̇ (n,) under τ (n,) [N·m].\n\n"
           "Raises Error where M is not positive definite.")
       .def("__repr__", [](const Dynamics& d) { return record("Dynamics", {{"dof", py::cast(d.dof())}}); });
+  bind_value(bound<Dynamics>(m, "Dynamics"));
 }
 
 void bind_computed_torque(py::module_& m) {
@@ -92,6 +121,7 @@ void bind_computed_torque(py::module_& m) {
         return std::string("ComputedTorqueStep(status=") + to_string(s.status) +
                ", torque=" + py::str(to_numpy(s.torque)).cast<std::string>() + ")";
       });
+  def_value(bound<ComputedTorqueStep>(m, "ComputedTorqueStep"));
 
   py::class_<ComputedTorque> c(
       m, "ComputedTorque",
@@ -103,6 +133,7 @@ void bind_computed_torque(py::module_& m) {
       "Raises Error where an option is out of its range, and where Dynamics does.",
       [](const Chain& chain, const ComputedTorqueOptions& options) { return ComputedTorque(chain, options); });
   def_options(c);
+  bind_value(c);
   c.def_property_readonly("dof", &ComputedTorque::dof, "Number of movable joints, n.")
       .def(
           "update",

@@ -1,6 +1,6 @@
 #include <sigmaik/least_squares.hpp>
 
-#include "arguments.hpp"
+#include "values.hpp"
 
 namespace sigmaik::bindings {
 namespace {
@@ -91,6 +91,7 @@ void bind_least_squares(py::module_& m) {
         return record("LeastSquaresSolution",
                       {{"status", py::cast(std::string(to_string(s.status)))}, {"x", to_numpy(s.x)}});
       });
+  def_value(bound<LeastSquaresSolution>(m, "LeastSquaresSolution"));
 
   m.def(
       "least_squares",

@@ -3,6 +3,7 @@
 #include <sigmaik/position_ik.hpp>
 
 #include "servo_options.hpp"
+#include "values.hpp"
 
 namespace sigmaik::bindings {
 
@@ -103,7 +104,8 @@ void bind_answers(py::module_& m) {
       .def_readonly("status", &PositionIkResult::status, "See PositionIkStatus.")
       .def_property_readonly(
           "error", [](const PositionIkResult& r) { return to_numpy(r.error); },
-          "(6,) [m, rad] pose_error from q to the target, base axes; zero in the rows that the task leaves out. With "
+          "(6,) [m, rad] pose_error from q to the target, base axes; zero in the rows that the task leaves out. "
+          "With "
           "a\n"
           "cone, the orientation part is the rotation by which the axis misses its direction.")
       .def_readonly("solve_time", &PositionIkResult::solve_time, "[s]")
@@ -113,6 +115,7 @@ void bind_answers(py::module_& m) {
                                            {"error", to_numpy(r.error)},
                                            {"solve_time", py::float_(r.solve_time)}});
       });
+  def_value(bound<PositionIkResult>(m, "PositionIkResult"));
   py::class_<PositionIkBranch>(m, "PositionIkBranch", "One of the solutions of PositionIk.branches().")
       .def_property_readonly(
           "q", [](const PositionIkBranch& b) { return to_numpy(b.q); }, "(n,) [rad or m] inside the limits.")
@@ -124,6 +127,7 @@ void bind_answers(py::module_& m) {
         return record("PositionIkBranch",
                       {{"q", to_numpy(b.q)}, {"sigma_min", py::float_(b.sigma_min)}, {"margin", py::float_(b.margin)}});
       });
+  def_value(bound<PositionIkBranch>(m, "PositionIkBranch"));
 }
 
 std::vector<PositionIkBranch> branches(const PositionIk& ik, const py::object& pose) {
@@ -154,6 +158,18 @@ py::array_t<double> solve_batch(const PositionIk& ik, const ArrayLike& poses, in
   return out;
 }
 
+void bind_value(py::class_<PositionIk>& c) {
+  def_pickle(
+      c, 2, [](const PositionIk& ik) { return py::make_tuple(ik.chain(), to_dict(ik.options())); },
+      [](const py::tuple& s) {
+        return PositionIk(s[0].cast<const Chain&>(), from_dict<PositionIkOptions>(s[1].cast<py::dict>()));
+      },
+      [](const PositionIk& a, const PositionIk& b) {
+        return same(a.chain(), b.chain()) && equal(a.options(), b.options());
+      });
+  def_hash_by_chain(c);
+}
+
 void bind_inverse(py::module_& m) {
   py::class_<PositionIk> c(
       m, "PositionIk",
@@ -172,6 +188,7 @@ void bind_inverse(py::module_& m) {
       c, std::tuple{parameter<Chain>("chain")}, 1, "",
       [](const Chain& chain, const PositionIkOptions& options) { return PositionIk(chain, options); });
   def_options(c);
+  bind_value(c);
   c.def("solve", &solve, py::arg("pose"), py::arg("near") = py::none(),
         "A solution of `pose` (4, 4), tip in base; PositionIkResult.\n\n"
         "near: (n,) [rad or m]. The answer is then the nearest solution that a bounded search finds, in travel time\n"

@@ -2,6 +2,7 @@
 #include <pybind11/native_enum.h>
 
 #include "servo_options.hpp"
+#include "values.hpp"
 
 namespace sigmaik::bindings {
 namespace {
@@ -70,9 +71,9 @@ void bind_step(py::module_& m) {
           "(6,) what the rule was given: the twist command, or the pose error's [m/s, rad/s]")
       .def_property_readonly(
           "achieved_twist", [](const ServoStep& s) { return to_numpy(s.achieved_twist); }, "(6,) J q̇ [m/s, rad/s]")
-      .def_readonly(
-          "scale", &ServoStep::scale,
-          "In [0, 1], what limits left: of the rule's speed ('scale'), or of its twist along itself ('redistribute').")
+      .def_readonly("scale", &ServoStep::scale,
+                    "In [0, 1], what limits left: of the rule's speed ('scale'), or of its twist along itself "
+                    "('redistribute').")
       .def_property_readonly(
           "limiting_joints", [](const ServoStep& s) { return indices(s.limiting_joints); },
           "Indices of the joints held at a limit that the rule's answer would break.")
@@ -102,7 +103,8 @@ void bind_step(py::module_& m) {
       .def_readonly("guide", &ServoStep::guide, "What the guide does, see GuideState.")
       .def_property_readonly(
           "guide_joints", [](const ServoStep& s) { return indices(s.guide_joints); },
-          "Indices of the joints that end elsewhere by the guide's way than by the servo's own: by more than 0.5 rad, "
+          "Indices of the joints that end elsewhere by the guide's way than by the servo's own: by more than 0.5 "
+          "rad, "
           "or half of the characteristic length.")
       .def_readonly("clearance", &ServoStep::clearance,
                     "[m] the least distance of all pairs of bodies after the step; inf where nothing is checked.")
@@ -119,6 +121,7 @@ void bind_step(py::module_& m) {
         return std::string("ServoStep(status=") + to_string(s.status) +
                ", qdot=" + py::str(to_numpy(s.qdot)).cast<std::string>() + ")";
       });
+  def_value(bound<ServoStep>(m, "ServoStep"));
 }
 
 void bind_setup(py::class_<Servo>& c) {
@@ -181,9 +184,10 @@ void bind_cycle(py::class_<Servo>& c) {
        [](Servo& s, const py::object& target, const MaybeArray& feedforward, std::optional<double> dt) {
          require_started(s);
          const std::optional<double> time = cycle_argument(s, dt);
-         const Pose pose = pose_argument(target, "target");
+         const Pose pose = s.options().strict ? pose_argument(target, "target") : target_argument(target, "target");
          const Twist twist = feedforward ? twist_argument(*feedforward, "feedforward") : Twist(Twist::Zero());
-         return checked(s.update(pose, twist, time));
+         const ServoStep step = s.update(pose, twist, time);
+         return is_pose(pose.matrix()) ? checked(step) : step;
        },
        py::arg("target"), py::arg("feedforward") = py::none(), py::arg("dt") = py::none(),
        "One cycle towards a pose (4, 4) of the tip in the base.\n\n"
@@ -194,7 +198,10 @@ void bind_cycle(py::class_<Servo>& c) {
        "    servo's dt. After a lost packet, or in a loop that is not even, the limits then hold against the clock: "
        "the\n"
        "    position command advances by q̇ dt, and q̇ changes by no more than the acceleration limit times dt.\n"
-       "Raises Error, and holds, where the target is not a pose, or dt is outside its range.")
+       "Raises Error, and holds, where dt is outside its range.\n"
+       "A matrix that is no pose (a rotation off by more than rounding, another last row) stops the arm: BAD_INPUT. "
+       "With\n"
+       "    strict=True of the servo it raises Error, as arguments of a wrong shape or with NaN do in any case.")
       .def(
           "update_twist",
           [](Servo& s, const ArrayLike& twist, const std::string& frame, const MaybeArray& point,
@@ -263,6 +270,18 @@ void bind_state(py::class_<Servo>& c) {
       });
 }
 
+void bind_value(py::class_<Servo>& c) {
+  def_state(
+      c, 3,
+      [](const Servo& s) { return py::make_tuple(s.chain(), method_to_python(s.method()), to_dict(s.options())); },
+      [](const py::tuple& s) {
+        return Servo(s[0].cast<const Chain&>(), s[1].cast<Method>(), from_dict<ServoOptions>(s[2].cast<py::dict>()));
+      },
+      [](const Servo& a, const Servo& b) {
+        return same(a.chain(), b.chain()) && equal(a.method(), b.method()) && equal(a.options(), b.options());
+      });
+}
+
 }  // namespace
 
 void bind_servo(py::module_& m) {
@@ -277,6 +296,7 @@ void bind_servo(py::module_& m) {
   bind_measurement(c);
   bind_cycle(c);
   bind_state(c);
+  bind_value(c);
 }
 
 }  // namespace sigmaik::bindings

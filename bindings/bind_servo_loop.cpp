@@ -9,7 +9,7 @@
 
 #include <sigmaik/servo_loop.hpp>
 
-#include "fields.hpp"
+#include "values.hpp"
 
 namespace sigmaik::bindings {
 
@@ -160,6 +160,37 @@ void bind_state(py::module_& m) {
       .finalize();
 }
 
+void bind_value(py::class_<LoopFault> c) {
+  const auto parts = [](const LoopFault& f) {
+    return py::make_tuple(static_cast<int>(f.kind), f.text, f.time, f.joint);
+  };
+  def_pickle(
+      c, 4, parts,
+      [](const py::tuple& s) {
+        const int kind = s[0].cast<int>();
+        if (kind < 1 || kind > 4) throw Error("the pickle of a LoopFault has no kind " + std::to_string(kind));
+        return LoopFault{static_cast<LoopFaultKind>(kind), s[1].cast<std::string>(), s[2].cast<double>(),
+                         s[3].cast<int>()};
+      },
+      [parts](const LoopFault& a, const LoopFault& b) { return parts(a).equal(parts(b)); });
+  c.def("__hash__", [parts](const LoopFault& f) { return py::hash(parts(f)); });
+}
+
+void bind_value(py::class_<LoopStatistics> c) {
+  const auto parts = [](const LoopStatistics& s) {
+    return py::make_tuple(s.cycles, s.missed, s.unread, s.sink_errors, s.rough_targets, s.worst_delay, s.elapsed);
+  };
+  def_pickle(
+      c, 7, parts,
+      [](const py::tuple& s) {
+        const auto count = [&](std::size_t i) { return s[i].cast<std::int64_t>(); };
+        return LoopStatistics{count(0),           count(1), count(2), count(3), count(4), s[5].cast<double>(),
+                              s[6].cast<double>()};
+      },
+      [parts](const LoopStatistics& a, const LoopStatistics& b) { return parts(a).equal(parts(b)); });
+  c.def("__hash__", [parts](const LoopStatistics& s) { return py::hash(parts(s)); });
+}
+
 void bind_fault(py::module_& m) {
   py::native_enum<LoopFaultKind>(m, "LoopFaultKind", "enum.IntEnum",
                                  "Why a ServoLoop stopped the arm by itself.\n\n"
@@ -183,6 +214,7 @@ void bind_fault(py::module_& m) {
                                     {"time", py::cast(f.time)},
                                     {"joint", py::cast(f.joint)}});
       });
+  bind_value(bound<LoopFault>(m, "LoopFault"));
   py::class_<LoopToken>(m, "LoopToken", "Names the owner of an arm to its ServoLoop: see ServoLoop.take.")
       .def("__eq__", [](const LoopToken& a,
                         const py::object& b) { return py::isinstance<LoopToken>(b) && a == b.cast<LoopToken>(); })
@@ -221,6 +253,7 @@ void bind_statistics(py::module_& m) {
                                          {"worst_delay", py::cast(s.worst_delay)},
                                          {"rate", py::cast(s.rate())}});
       });
+  bind_value(bound<LoopStatistics>(m, "LoopStatistics"));
 }
 
 void bind_thread(py::class_<ServoLoop>& c) {
@@ -251,6 +284,8 @@ void bind_safety(py::class_<ServoLoop>& c) {
           py::arg("token") = py::none(),
           "Opens the latch of halt(), or of a fault that is acknowledged. The arm rests until a new command comes.\n\n"
           "Raises Error where the arm does not rest yet, a fault is not acknowledged, or somebody else owns the arm.")
+      .def_property_readonly("halted", &ServoLoop::halted,
+                             "Whether the latch of halt(), or of a fault, is closed: also while no thread runs.")
       .def_property_readonly("fault", &ServoLoop::fault,
                              "The fault that stopped the arm, until acknowledge(); or None.")
       .def("acknowledge", &ServoLoop::acknowledge,

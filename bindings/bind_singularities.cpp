@@ -196,6 +196,11 @@ void bind_singularities(py::module_& m) {
       .def(
           "_manipulability_tape", [](const SingularSets& s) { return recording(s.manipulability_tape()); },
           "See sigmaik.singularities.symbolic_manipulability_squared.")
+      .def("__eq__",
+           [](const SingularSets& a, const py::object& b) {
+             return py::isinstance<SingularSets>(b) && a.name() == b.cast<const SingularSets&>().name();
+           })
+      .def("__hash__", [](const SingularSets& s) { return py::hash(py::str(s.name())); })
       .def("__reduce__",
            [](const py::object& self) -> py::typing::Tuple<py::object, py::typing::Tuple<py::str>> {
              const py::object load = py::module_::import("sigmaik.singularities").attr("load");

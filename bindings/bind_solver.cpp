@@ -1,4 +1,5 @@
-#include "arguments.hpp"
+#include "servo_options.hpp"
+#include "values.hpp"
 
 namespace sigmaik::bindings {
 namespace {
@@ -9,6 +10,29 @@ py::array_t<bool> singular_mask(std::uint8_t bits, py::ssize_t size) {
   py::array_t<bool> out(size);
   for (py::ssize_t i = 0; i < size; ++i) out.mutable_data()[i] = (bits >> i & 1u) != 0;
   return out;
+}
+
+void bind_spectrum_value(py::class_<Spectrum> c) {
+  def_equality(c, [](const Spectrum& a, const Spectrum& b) { return same(a, b); });
+  c.def(py::pickle([](const Spectrum& s) { return py::make_tuple(kValuesVersion, py::bytes(save(s))); },
+                   [](const py::tuple& state) {
+                     check_pickle(state, 2, "Spectrum");
+                     return load<Spectrum>(pickled_bytes(state, 1, "Spectrum"));
+                   }));
+}
+
+void bind_value(py::class_<VelocitySolver> c) {
+  def_state(
+      c, 3,
+      [](const VelocitySolver& s) {
+        return py::make_tuple(method_to_python(s.method()), s.length_scale(), to_dict(s.task()));
+      },
+      [](const py::tuple& s) {
+        return VelocitySolver(s[0].cast<Method>(), s[1].cast<double>(), from_dict<Task>(s[2].cast<py::dict>()));
+      },
+      [](const VelocitySolver& a, const VelocitySolver& b) {
+        return equal(a.method(), b.method()) && a.length_scale() == b.length_scale() && equal(a.task(), b.task());
+      });
 }
 
 void bind_spectrum(py::module_& m) {
@@ -39,6 +63,7 @@ void bind_spectrum(py::module_& m) {
         for (int i = 0; i < s.size(); ++i) sigma.append(s.sigma(i));
         return record("Spectrum", {{"rows", py::cast(s.rows())}, {"cols", py::cast(s.cols())}, {"sigma", sigma}});
       });
+  bind_spectrum_value(bound<Spectrum>(m, "Spectrum"));
 }
 
 void bind_solution(py::module_& m) {
@@ -73,6 +98,7 @@ void bind_solution(py::module_& m) {
         return std::string("Solution(status=") + to_string(s.status) + ", " + std::to_string(s.singular_count()) +
                " singular directions, qdot=" + py::str(to_numpy(s.qdot)).cast<std::string>() + ")";
       });
+  def_value(bound<Solution>(m, "Solution"));
 }
 
 void bind_velocity_solver(py::module_& m) {
@@ -111,7 +137,8 @@ void bind_velocity_solver(py::module_& m) {
           },
           py::arg("J"), py::arg("twist"), py::arg("posture") = py::none(), py::arg("rotation") = py::none(),
           "Joint velocities for a twist.\n\n"
-          "J: (m, n), 1 ≤ m ≤ 6, 1 ≤ n ≤ 16. With six rows the mask applies; with as many rows as the mask asks for "
+          "J: (m, n), 1 ≤ m ≤ 6, 1 ≤ n ≤ 16. With six rows the mask applies; with as many rows as the mask asks "
+          "for "
           "it\n"
           "    is taken as masked. Without a mask, rows from the fourth on count as angular.\n"
           "twist: (m,) [m/s, rad/s].\n"
@@ -136,6 +163,7 @@ void bind_velocity_solver(py::module_& m) {
         return record("VelocitySolver",
                       {{"", method_to_python(s.method())}, {"length_scale", py::cast(s.length_scale())}});
       });
+  bind_value(bound<VelocitySolver>(m, "VelocitySolver"));
 }
 
 void bind_batch(py::module_& m) {

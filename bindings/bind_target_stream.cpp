@@ -1,6 +1,6 @@
 #include <pybind11/native_enum.h>
 
-#include "fields.hpp"
+#include "values.hpp"
 
 namespace sigmaik::bindings {
 
@@ -79,6 +79,7 @@ void bind_answers(py::module_& m) {
                ", outliers=" + std::to_string(c.outliers) + ", out_of_order=" + std::to_string(c.out_of_order) +
                ", invalid=" + std::to_string(c.invalid) + ")";
       });
+  def_value(bound<SampleCounts>(m, "SampleCounts"));
 
   py::class_<Target>(m, "Target", "Where to be now, and how to move: servo.update(target.pose, target.twist).")
       .def_property_readonly(
@@ -92,6 +93,14 @@ void bind_answers(py::module_& m) {
         return std::string("Target(status=") + to_string(t.status) +
                ", age=" + py::str(py::float_(t.age)).cast<std::string>() + ")";
       });
+  def_value(bound<Target>(m, "Target"));
+}
+
+void bind_value(py::class_<TargetStream>& c) {
+  def_state(
+      c, 1, [](const TargetStream& s) { return py::make_tuple(to_dict(s.options())); },
+      [](const py::tuple& s) { return TargetStream(from_dict<TargetStreamOptions>(s[0].cast<py::dict>())); },
+      [](const TargetStream& a, const TargetStream& b) { return equal(a.options(), b.options()); });
 }
 
 void bind_stream(py::module_& m) {
@@ -139,6 +148,7 @@ void bind_stream(py::module_& m) {
         return record("TargetStream",
                       {{"mode", Argument<StreamMode>::to(s.options().mode)}, {"", py::cast(s.counts())}});
       });
+  bind_value(c);
 }
 
 }  // namespace

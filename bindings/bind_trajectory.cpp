@@ -1,3 +1,6 @@
+#include <algorithm>
+#include <cmath>
+
 #include <sigmaik/planning/clearance.hpp>
 #include <sigmaik/planning/play.hpp>
 #include <sigmaik/planning/trajectory.hpp>
@@ -135,6 +138,24 @@ StatusObject status_object(planning::PlanStatus status) {
 
 std::string number_text(double value) { return py::str("{:.4g}").format(value).cast<std::string>(); }
 
+// NaN is the same as NaN: the duration and the cost of a plan that failed.
+bool equal(double a, double b) { return a == b || (std::isnan(a) && std::isnan(b)); }
+bool equal(const std::vector<double>& a, const std::vector<double>& b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](double x, double y) { return equal(x, y); });
+}
+bool equal(const Clearance& a, const Clearance& b) {
+  return equal(a.t, b.t) && equal(a.manipulability, b.manipulability) && a.names == b.names && equal(a.psi, b.psi) &&
+         a.crossings == b.crossings;
+}
+bool equal(const Trajectory& a, const Trajectory& b) {
+  const bool same_clearance = a.clearance.has_value() == b.clearance.has_value() &&
+                              (!a.clearance || equal(*a.clearance, *b.clearance));
+  return a.dof == b.dof && equal(a.t, b.t) && equal(a.q, b.q) && equal(a.qdot, b.qdot) && equal(a.qddot, b.qddot) &&
+         equal(a.duration, b.duration) && a.status == b.status && equal(a.cost, b.cost) &&
+         a.solve_time == b.solve_time && a.iterations == b.iterations && a.starts == b.starts && a.cubic == b.cubic &&
+         same_clearance;
+}
+
 void bind_crossing(py::module_& m) {
   py::class_<Crossing>(m, "Crossing",
                        "A motion goes through a singular set here, or so near to it that the set's potential does not\n"
@@ -226,6 +247,9 @@ void bind_clearance(py::module_& m) {
   py::class_<Clearance> cls(m, "Clearance", "Singularity along a motion that is sampled densely, M samples.");
   bind_clearance_samples(cls);
   bind_clearance_summary(cls);
+  cls.def("__eq__", [](const Clearance& a, const py::object& b) {
+    return py::isinstance<Clearance>(b) && equal(a, b.cast<const Clearance&>());
+  });
   cls.def(
       py::pickle([](const Clearance& c) { return py::make_tuple(c.t, c.manipulability, c.names, c.psi, c.crossings); },
                  [](const py::tuple& s) {
@@ -331,6 +355,9 @@ void bind_times(py::class_<Trajectory>& c) {
 }
 
 void bind_pickle(py::class_<Trajectory>& c) {
+  c.def("__eq__", [](const Trajectory& a, const py::object& b) {
+    return py::isinstance<Trajectory>(b) && equal(a, b.cast<const Trajectory&>());
+  });
   c.def(py::pickle(
       [](const Trajectory& p) {
         return py::make_tuple(p.dof, p.t, p.q, p.qdot, p.qddot, p.duration, to_string(p.status), p.cost, p.solve_time,

@@ -140,6 +140,8 @@ struct Fields<ServoOptions> {
       field("collisions", &ServoOptions::collisions,
             "what the arm must not touch: no command brings a pair of bodies nearer than the margin. None: nothing is "
             "checked."),
+      field("strict", &ServoOptions::strict,
+            "whether `update` raises Error for a target that is no pose, in place of BAD_INPUT and a stop."),
       nested(&ServoOptions::task),
   };
 };

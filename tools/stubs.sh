@@ -16,6 +16,7 @@ sed -zEi '
   s/\n__version__: str = [^\n]*/\n__version__: str/
   s/__hash__: typing\.ClassVar\[None\] = None\n/__hash__: typing.ClassVar[None] = None  # type: ignore[assignment]\n/g
   s/\(self, arg0: tuple\)/(self, arg0: tuple[typing.Any, ...])/g
+  s/ -> tuple:\n/ -> tuple[typing.Any, ...]:\n/g
   s/ +\n/\n/g' "$out/sigmaik/_core.pyi"
 # Both files in sections by topic: the order in which branches were merged makes no difference.
 .venv/bin/python tools/stub_sections.py "$out/sigmaik/_core.pyi" python/sigmaik/_core.pyi

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <set>
 #include <sstream>
 
@@ -79,7 +80,8 @@ void prepare_joint(Segment& s) {
   const double length = s.axis.norm();
   require(s.axis.allFinite() && length > 1e-9 && length < kLargestOffset, label(s), ": axis (", s.axis.transpose(),
           ") has no direction");
-  s.axis /= length;
+  // A unit vector stays as it is, to the last digit: the segments of a chain make the same chain again.
+  if (std::abs(length - 1.0) > 4.0 * std::numeric_limits<double>::epsilon()) s.axis /= length;
   if (s.type == JointType::Continuous) {
     s.lower = -kInfinity;
     s.upper = kInfinity;

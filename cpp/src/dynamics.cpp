@@ -26,6 +26,9 @@ Eigen::Map<Eigen::MatrixXd> entries(KDL::JntSpaceInertiaMatrix& matrix) {
 }  // namespace
 
 struct Dynamics::Model {
+  Chain arm;  // as given, for copies
+  Eigen::Vector3d given_gravity;
+  std::optional<Inertia> given_payload;
   KDL::Chain chain;  // declared before the solvers, which keep a reference to the chain
   KDL::ChainDynParam solver;
   KDL::ChainIdSolver_RNE recursion;
@@ -40,10 +43,13 @@ struct Dynamics::Model {
   const KDL::Wrenches no_wrenches;
   DynamicsTerms terms;
 
-  Model(const Chain& arm, const KDL::Vector& gravity, const std::optional<Inertia>& payload)
-      : chain(loaded(arm, payload)),
-        solver(chain, gravity),
-        recursion(chain, gravity),
+  Model(const Chain& of, const Eigen::Vector3d& gravity, const std::optional<Inertia>& payload)
+      : arm(of),
+        given_gravity(gravity),
+        given_payload(payload),
+        chain(loaded(arm, payload)),
+        solver(chain, KDL::Vector(gravity.x(), gravity.y(), gravity.z())),
+        recursion(chain, KDL::Vector(gravity.x(), gravity.y(), gravity.z())),
         mimics(arm.has_mimics()),
         dof(arm.dof()),
         coupling(arm.coupling_matrix()),
@@ -127,7 +133,15 @@ Dynamics::Dynamics(const Chain& chain, const Eigen::Vector3d& gravity, const std
   }
   if (payload && payload->mass > 0.0) waiting.clear();
   check();
-  model_ = std::make_unique<Model>(chain, KDL::Vector(gravity.x(), gravity.y(), gravity.z()), payload);
+  model_ = std::make_unique<Model>(chain, gravity, payload);
+}
+
+// KDL's solvers refer to their chain: a copy has solvers of its own.
+Dynamics::Dynamics(const Dynamics& other)
+    : model_(std::make_unique<Model>(other.model_->arm, other.model_->given_gravity, other.model_->given_payload)) {}
+Dynamics& Dynamics::operator=(const Dynamics& other) {
+  if (this != &other) *this = Dynamics(other);
+  return *this;
 }
 
 Dynamics::~Dynamics() = default;
@@ -135,6 +149,9 @@ Dynamics::Dynamics(Dynamics&&) noexcept = default;
 Dynamics& Dynamics::operator=(Dynamics&&) noexcept = default;
 
 int Dynamics::dof() const noexcept { return model_->dof; }
+const Chain& Dynamics::chain() const noexcept { return model_->arm; }
+const Eigen::Vector3d& Dynamics::gravity() const noexcept { return model_->given_gravity; }
+const std::optional<Inertia>& Dynamics::payload() const noexcept { return model_->given_payload; }
 
 void Dynamics::evaluate(const JointRef& q, const JointRef& qdot, DynamicsTerms& terms) noexcept {
   Model& m = *model_;

@@ -43,6 +43,7 @@ class Guide {
   const JointVector* posture() const noexcept { return with_posture_ ? &goal_ : nullptr; }
 
  private:
+  friend struct Members<Guide>;
   enum class Phase : std::int8_t { Nothing, Waiting, Predicting, Searching, Following, Leading, Done };
   enum class Outcome : std::int8_t { Open, Arrives, Rests };
 

@@ -119,6 +119,7 @@ NearestSearch::NearestSearch(const NearestSearch& other) noexcept
       starts_(other.starts_),
       pulled_(other.pulled_),
       pulls_(other.pulls_),
+      slices_(other.slices_),
       least_(other.least_),
       point_(other.point_),
       best_(other.best_) {
@@ -159,6 +160,7 @@ bool NearestSearch::pull() noexcept {
 }
 
 bool NearestSearch::advance() noexcept {
+  ++slices_;
   switch (stage_) {
     case Stage::ClosedForm:
       if (model_->closed_form_branches(search_, pose_, &near_, found_)) return rank();

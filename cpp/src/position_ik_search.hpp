@@ -62,6 +62,11 @@ class NearestSearch {
   // The descent that the points belong to.
   const Descent& descent() const noexcept { return search_; }
 
+  // The arguments, and how often advance() was called: with these a search is made again as it is.
+  const Pose& pose() const noexcept { return pose_; }
+  const JointVector& near() const noexcept { return near_; }
+  int slices() const noexcept { return slices_; }
+
  private:
   enum class Stage : std::int8_t { ClosedForm, Near, NearLonger, Table, First, Pull, Ended };
   double travel_time(const JointVector& q) const noexcept;
@@ -76,7 +81,7 @@ class NearestSearch {
   StartOrder order_;
   std::optional<FirstSearch> first_;
   Stage stage_ = Stage::ClosedForm;
-  int starts_ = 0, pulled_ = 0, pulls_ = 0;
+  int starts_ = 0, pulled_ = 0, pulls_ = 0, slices_ = 0;
   double least_;
   DescentPoint point_, best_;
 };

@@ -61,7 +61,15 @@ class JointLimits:
     """
     Limits of a chain's movable joints, (n,) each, infinite where there is none.
     """
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[int, bytes]:
+        ...
+    def __hash__(self) -> int:
+        ...
     def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple[typing.Any, ...]) -> None:
         ...
     @property
     def acceleration(self) -> numpy.typing.NDArray[numpy.float64]:
@@ -102,6 +110,12 @@ class Inertia:
     """
     Mass distribution of a link, or of what the tip carries. Immutable.
     """
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[int, bytes]:
+        ...
+    def __hash__(self) -> int:
+        ...
     def __init__(self, mass: typing.SupportsFloat | typing.SupportsIndex, center_of_mass: numpy.typing.ArrayLike = (0.0, 0.0, 0.0), tensor: numpy.typing.ArrayLike | None = None) -> None:
         """
         mass: [kg].
@@ -111,6 +125,8 @@ class Inertia:
         Chains and Dynamics check the values.
         """
     def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple[typing.Any, ...]) -> None:
         ...
     @property
     def center_of_mass(self) -> numpy.typing.NDArray[numpy.float64]:
@@ -131,7 +147,15 @@ class Segment:
     """
     A joint, fixed or movable, and the link that it carries. The link's frame is the joint's after the motion: parent ← origin · motion(axis, q).
     """
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[int, bytes]:
+        ...
+    def __hash__(self) -> int:
+        ...
     def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple[typing.Any, ...]) -> None:
         ...
     @property
     def axis(self) -> numpy.typing.NDArray[numpy.float64]:
@@ -188,7 +212,15 @@ class Chain:
         (ModelWarning) of velocity limits of zero, which count as none, of joints that mimic a joint beside the arm, which
         move by themselves, and of inertias that no rigid body has.
         """
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[int, bytes]:
+        ...
+    def __hash__(self) -> int:
+        ...
     def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple[typing.Any, ...]) -> None:
         ...
     def jacobian(self, q: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
         """
@@ -285,7 +317,15 @@ class AnalyticBranch:
     """
     One posture of a pose, from AnalyticIk.branches().
     """
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[int, bytes]:
+        ...
+    def __hash__(self) -> int:
+        ...
     def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple[typing.Any, ...]) -> None:
         ...
     @property
     def q(self) -> numpy.typing.NDArray[numpy.float64]:
@@ -310,11 +350,19 @@ class AnalyticIk:
     1e-9 [rad, or of the arm's size], however frames, signs and zeros are laid: offsets, and
     angles other than right ones, included. Immutable, safe to share.
     """
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[typing.Any, ...]:
+        ...
+    def __hash__(self) -> int:
+        ...
     def __init__(self, chain: Chain) -> None:
         """
         Raises Error with the facts where the arm is not of this kind.
         """
     def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple[typing.Any, ...]) -> None:
         ...
     def branches(self, pose: typing.Any, *, within_limits: bool = False) -> list[AnalyticBranch]:
         """
@@ -571,9 +619,16 @@ class Spectrum:
     Keeps the last decomposition as a warm start, and as what singular vectors continue where they
     are not unique.
     """
+    __hash__: typing.ClassVar[None] = None  # type: ignore[assignment]
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[int, bytes]:
+        ...
     def __init__(self) -> None:
         ...
     def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple[typing.Any, ...]) -> None:
         ...
     def decompose(self, J: numpy.typing.ArrayLike) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
         """
@@ -588,7 +643,15 @@ class Solution:
     """
     Answer of VelocitySolver.solve().
     """
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[int, bytes]:
+        ...
+    def __hash__(self) -> int:
+        ...
     def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple[typing.Any, ...]) -> None:
         ...
     @property
     def achieved_twist(self) -> numpy.typing.NDArray[numpy.float64]:
@@ -629,6 +692,11 @@ class VelocitySolver:
     """
     Resolves twists at given Jacobians by one method. Keeps only a warm start.
     """
+    __hash__: typing.ClassVar[None] = None  # type: ignore[assignment]
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[typing.Any, ...]:
+        ...
     def __init__(self, method: Method | str, length_scale: typing.SupportsFloat | typing.SupportsIndex = 1.0, mask: numpy.typing.ArrayLike | None = None, frame: str = 'base') -> None:
         """
         length_scale: [m] > 0; 1 rad/s weighs as much as length_scale m/s. In proportion to the arm, it makes
@@ -637,6 +705,8 @@ class VelocitySolver:
         frame: the axes of these rows, 'base' or 'tool'.
         """
     def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple[typing.Any, ...]) -> None:
         ...
     def reset(self) -> None:
         """
@@ -893,7 +963,15 @@ class ServoStep:
     """
     Answer of one cycle of a Servo.
     """
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[int, bytes]:
+        ...
+    def __hash__(self) -> int:
+        ...
     def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple[typing.Any, ...]) -> None:
         ...
     @property
     def achieved_twist(self) -> numpy.typing.NDArray[numpy.float64]:
@@ -1057,6 +1135,8 @@ class Servo:
         frame: the axes of these rows, the base's or the tool's.
         """
     def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple[typing.Any, ...]) -> None:
         ...
     def continue_from(self, other: Servo) -> None:
         """
@@ -1368,7 +1448,15 @@ class LoopFault:
     """
     The first fault of a ServoLoop since the last acknowledge().
     """
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[typing.Any, ...]:
+        ...
+    def __hash__(self) -> int:
+        ...
     def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple[typing.Any, ...]) -> None:
         ...
     @property
     def joint(self) -> int:
@@ -1402,7 +1490,15 @@ class LoopStatistics:
     """
     How a ServoLoop keeps its rate.
     """
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[typing.Any, ...]:
+        ...
+    def __hash__(self) -> int:
+        ...
     def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple[typing.Any, ...]) -> None:
         ...
     @property
     def cycles(self) -> int:
@@ -1565,6 +1661,11 @@ class ServoLoop:
         The fault that stopped the arm, until acknowledge(); or None.
         """
     @property
+    def halted(self) -> bool:
+        """
+        Whether the latch of halt(), or of a fault, is closed: also while no thread runs.
+        """
+    @property
     def owner(self) -> str:
         """
         The owner's name; '' where nobody owns the arm.
@@ -1611,7 +1712,15 @@ class SampleCounts:
     """
     How many samples had which fate.
     """
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[int, bytes]:
+        ...
+    def __hash__(self) -> int:
+        ...
     def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple[typing.Any, ...]) -> None:
         ...
     @property
     def accepted(self) -> int:
@@ -1649,7 +1758,15 @@ class Target:
     """
     Where to be now, and how to move: servo.update(target.pose, target.twist).
     """
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[int, bytes]:
+        ...
+    def __hash__(self) -> int:
+        ...
     def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple[typing.Any, ...]) -> None:
         ...
     @property
     def age(self) -> float:
@@ -1683,6 +1800,11 @@ class TargetStream:
     than max_speed and max_angular_speed: not when a sample arrives, not when the stream stops or starts again, not
     when the target is found elsewhere.
     """
+    __hash__: typing.ClassVar[None] = None  # type: ignore[assignment]
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[typing.Any, ...]:
+        ...
     def __init__(self, mode: typing.Literal['hold', 'interpolate', 'predict'] = 'predict', *, max_speed: typing.SupportsFloat | typing.SupportsIndex = 1.5, max_angular_speed: typing.SupportsFloat | typing.SupportsIndex = 4.0, smoothing: typing.SupportsFloat | typing.SupportsIndex = 0.05, latency: typing.SupportsFloat | typing.SupportsIndex = 0.1, horizon: typing.SupportsFloat | typing.SupportsIndex = 0.1, timeout: typing.SupportsFloat | typing.SupportsIndex = 0.3, noise_linear: typing.SupportsFloat | typing.SupportsIndex = 0.002, noise_angular: typing.SupportsFloat | typing.SupportsIndex = 0.01, acceleration_linear: typing.SupportsFloat | typing.SupportsIndex = 3.0, acceleration_angular: typing.SupportsFloat | typing.SupportsIndex = 10.0, relocate: typing.SupportsInt | typing.SupportsIndex = 5) -> None:
         """
         mode: where the target is between samples, and after the last one. 'hold': at the last sample, for
@@ -1702,6 +1824,8 @@ class TargetStream:
         relocate: ≥ 1: so many refused samples in a row that agree with each other are believed.
         """
     def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple[typing.Any, ...]) -> None:
         ...
     def at(self, time: typing.SupportsFloat | typing.SupportsIndex) -> Target:
         """
@@ -1884,6 +2008,12 @@ class Dynamics:
     """
     Rigid-body dynamics M(q) q̈ + C(q, q̇) q̇ + g(q) = τ of a chain with what it carries, by KDL.
     """
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[typing.Any, ...]:
+        ...
+    def __hash__(self) -> int:
+        ...
     def __init__(self, chain: Chain, gravity: numpy.typing.ArrayLike | None = None, payload: Inertia | None = None) -> None:
         """
         gravity: (3,) [m/s²] in base axes; by default 9.80665 m/s² along −z.
@@ -1893,6 +2023,8 @@ class Dynamics:
         a mass below 0, a tensor that is not symmetric, a principal moment beyond the sum of the other two.
         """
     def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple[typing.Any, ...]) -> None:
         ...
     def coriolis(self, q: numpy.typing.ArrayLike, qdot: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
         """
@@ -1925,7 +2057,15 @@ class ComputedTorqueStep:
     """
     Answer of one cycle of a ComputedTorque.
     """
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[int, bytes]:
+        ...
+    def __hash__(self) -> int:
+        ...
     def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple[typing.Any, ...]) -> None:
         ...
     @property
     def limiting_joints(self) -> tuple[int, ...]:
@@ -1954,6 +2094,12 @@ class ComputedTorque:
     With the true model every joint's error obeys ë + 2ζω ė + ω² e = 0 by itself (Beck et al. 2022,
     eqs. 18 to 20). Where an effort limit of the chain would be broken, v is scaled down in all joints alike.
     """
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[typing.Any, ...]:
+        ...
+    def __hash__(self) -> int:
+        ...
     def __init__(self, chain: Chain, *, frequency: typing.SupportsFloat | typing.SupportsIndex = 20.0, damping_ratio: typing.SupportsFloat | typing.SupportsIndex = 1.0, gravity: numpy.typing.ArrayLike | None = (0.0, 0.0, -9.80665), payload: Inertia | None = None) -> None:
         """
         Raises Error where an option is out of its range, and where Dynamics does.
@@ -1964,6 +2110,8 @@ class ComputedTorque:
         payload: what the controller knows of the tip's load, in the tip's frame, as for Dynamics.
         """
     def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple[typing.Any, ...]) -> None:
         ...
     def update(self, q: numpy.typing.ArrayLike, qdot: numpy.typing.ArrayLike, q_desired: numpy.typing.ArrayLike, qdot_desired: numpy.typing.ArrayLike, qddot_desired: numpy.typing.ArrayLike) -> ComputedTorqueStep:
         """
@@ -1985,7 +2133,15 @@ class LeastSquaresSolution:
     """
     Answer of least_squares().
     """
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[int, bytes]:
+        ...
+    def __hash__(self) -> int:
+        ...
     def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple[typing.Any, ...]) -> None:
         ...
     @property
     def active(self) -> tuple[int, ...]:
@@ -2043,7 +2199,15 @@ class ConstrainedIkStep:
     """
     Answer of one cycle of a ConstrainedIk.
     """
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[int, bytes]:
+        ...
+    def __hash__(self) -> int:
+        ...
     def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple[typing.Any, ...]) -> None:
         ...
     @property
     def active(self) -> tuple[int, ...]:
@@ -2110,7 +2274,12 @@ class ConstrainedIk:
     Follows a target pose inside every joint limit: an exact part, and the rest as well as the
     limits allow (Schreiber, Otter and Hirzinger 1999).
     """
-    def __init__(self, chain: Chain, dt: typing.SupportsFloat | typing.SupportsIndex = 0.001, *, exact: numpy.typing.ArrayLike | None = (1, 1, 1, 0, 0, 0), alpha: numpy.typing.ArrayLike | None = 1.0, beta: numpy.typing.ArrayLike | None = 5.0, gamma: typing.SupportsFloat | typing.SupportsIndex | None = None, max_error: numpy.typing.ArrayLike | None = ..., iterations: typing.SupportsInt | typing.SupportsIndex = 2, torque_limits: bool = False, analytic: bool = True, mask: numpy.typing.ArrayLike | None = (1, 1, 1, 1, 1, 1), frame: typing.Literal['base', 'tool'] = 'base', gravity: numpy.typing.ArrayLike | None = (0.0, 0.0, -9.80665), position_limits: bool = True, velocity_limits: bool = True, acceleration_limits: bool = True, jerk_limits: bool = True, assumed_acceleration: typing.SupportsFloat | typing.SupportsIndex = 10.0, recovery_speed: typing.SupportsFloat | typing.SupportsIndex = 0.1) -> None:
+    __hash__: typing.ClassVar[None] = None  # type: ignore[assignment]
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[typing.Any, ...]:
+        ...
+    def __init__(self, chain: Chain, dt: typing.SupportsFloat | typing.SupportsIndex = 0.001, *, exact: numpy.typing.ArrayLike | None = (1, 1, 1, 0, 0, 0), alpha: numpy.typing.ArrayLike | None = 1.0, beta: numpy.typing.ArrayLike | None = 5.0, gamma: typing.SupportsFloat | typing.SupportsIndex | None = None, max_error: numpy.typing.ArrayLike | None = ..., iterations: typing.SupportsInt | typing.SupportsIndex = 2, torque_limits: bool = False, analytic: bool = True, mask: numpy.typing.ArrayLike | None = (1, 1, 1, 1, 1, 1), frame: typing.Literal['base', 'tool'] = 'base', gravity: numpy.typing.ArrayLike | None = (0.0, 0.0, -9.80665), position_limits: bool = True, velocity_limits: bool = True, acceleration_limits: bool = True, jerk_limits: bool = True, assumed_acceleration: typing.SupportsFloat | typing.SupportsIndex = 10.0, recovery_speed: typing.SupportsFloat | typing.SupportsIndex = 0.1, strict: bool = False) -> None:
         """
         Warns (ModelWarning) of velocity and acceleration limits that joints lack.
 
@@ -2141,8 +2310,12 @@ class ConstrainedIk:
             inf: they have none.
         recovery_speed: in (0, 1], of the velocity limit: the least speed at which a joint that starts
             outside its position limits comes back.
+        strict: whether `update` raises Error for a target that is no pose, in place of BAD_INPUT and a
+            stop.
         """
     def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple[typing.Any, ...]) -> None:
         ...
     def reset(self, q: numpy.typing.ArrayLike, qdot: numpy.typing.ArrayLike | None = None) -> None:
         """
@@ -2209,7 +2382,15 @@ class PositionIkResult:
     """
     Answer of PositionIk.solve().
     """
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[int, bytes]:
+        ...
+    def __hash__(self) -> int:
+        ...
     def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple[typing.Any, ...]) -> None:
         ...
     @property
     def error(self) -> numpy.typing.NDArray[numpy.float64]:
@@ -2237,7 +2418,15 @@ class PositionIkBranch:
     """
     One of the solutions of PositionIk.branches().
     """
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[int, bytes]:
+        ...
+    def __hash__(self) -> int:
+        ...
     def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple[typing.Any, ...]) -> None:
         ...
     @property
     def margin(self) -> float:
@@ -2267,6 +2456,12 @@ class PositionIk:
     Universal Robots' arms have, are solved in closed form. The same call gives the same answer. Immutable, safe to
     share.
     """
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[typing.Any, ...]:
+        ...
+    def __hash__(self) -> int:
+        ...
     def __init__(self, chain: Chain, tolerance: numpy.typing.ArrayLike = (1e-06, 1e-06), *, mask: numpy.typing.ArrayLike | None = (1, 1, 1, 1, 1, 1), frame: typing.Literal['base', 'tool'] = 'base', exact: numpy.typing.ArrayLike | None = (0, 0, 0, 0, 0, 0), ranges: numpy.typing.ArrayLike | None = None, cone: tuple[numpy.typing.ArrayLike, float] | None = None, starts: typing.SupportsInt | typing.SupportsIndex = 256) -> None:
         """
         tolerance: (2,) [m], [rad] > 0: the largest errors of position and orientation that a solution may
@@ -2284,6 +2479,8 @@ class PositionIk:
         starts: 1 to 2048, the most starts of a search. A pose out of reach takes all of them.
         """
     def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple[typing.Any, ...]) -> None:
         ...
     def branches(self, pose: typing.Any) -> list[PositionIkBranch]:
         """
@@ -2353,6 +2550,10 @@ class SingularSets:
     the squared distance in the joints' space. A set's codimension is the number of its residuals:
     those of codimension 1 are walls, across which r changes its sign.
     """
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
+    def __hash__(self) -> int:
+        ...
     def __len__(self) -> int:
         ...
     def __reduce__(self) -> tuple[typing.Any, tuple[str]]:
@@ -2482,6 +2683,9 @@ class Clearance:
     """
     Singularity along a motion that is sampled densely, M samples.
     """
+    __hash__: typing.ClassVar[None] = None  # type: ignore[assignment]
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
     def __getstate__(self) -> tuple[list[float], list[float], list[str], list[float], list[Crossing]]:
         ...
     def __init__(self, t: numpy.typing.ArrayLike, manipulability: numpy.typing.ArrayLike, names: collections.abc.Sequence[str], psi: numpy.typing.ArrayLike, crossings: collections.abc.Sequence[Crossing]) -> None:
@@ -2547,6 +2751,7 @@ class Trajectory:
     Between samples the acceleration is constant, or, where `cubic`, changes evenly: `sample` is
     exact. A failed plan has no samples: its arrays are empty.
     """
+    __hash__: typing.ClassVar[None] = None  # type: ignore[assignment]
     @staticmethod
     def _load_text(file: str) -> Trajectory:
         ...
@@ -2555,6 +2760,8 @@ class Trajectory:
         """
         What `save` has written. Raises Error where the file is something else.
         """
+    def __eq__(self, arg0: typing.Any) -> bool:
+        ...
     def __getstate__(self) -> tuple[int, list[float], list[float], list[float], list[float], float, str, float, float, int, int, bool, Clearance | None]:
         ...
     @typing.overload

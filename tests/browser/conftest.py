@@ -1,9 +1,13 @@
 """A page, and a browser that looks at it: Debian's Chromium without a screen, driven by Playwright."""
 
+import io
 import os
 import shutil
+import time
 
+import numpy as np
 import pytest
+from PIL import Image
 
 from sigmaik.teleop import Session
 from sigmaik.teleop.page import Page
@@ -55,11 +59,25 @@ class Driven:
 
     def _holds(self, condition, seconds):
         """Whether a condition holds within some seconds."""
-        for _ in range(int(seconds / 0.1)):
-            if condition():
-                return True
-            self.tab.wait_for_timeout(100)
-        return False
+        end = time.monotonic() + seconds
+        while not condition():
+            if time.monotonic() > end:
+                return False
+            self.tab.wait_for_timeout(20)
+        return True
+
+    def picture(self):
+        """(height, width, 3) what the tab shows, once it does not change any more."""
+        last, end = self._picture(), time.monotonic() + PATIENCE
+        while time.monotonic() < end:
+            now = self._picture()
+            if np.abs(now - last).max() < 30.0:
+                return now
+            last = now
+        raise AssertionError("the picture does not come to rest")
+
+    def _picture(self):
+        return np.asarray(Image.open(io.BytesIO(self.tab.screenshot())).convert("RGB"), dtype=float)
 
     def control(self, label):
         """The control beside a label."""
@@ -97,15 +115,16 @@ class Driven:
 
 @pytest.fixture
 def drive(browser, tmp_path):
-    """drive(robot): a session, its page, and a tab that shows it; drive(beside=page): another browser of a page."""
+    """drive(robot): a session, its page, and a tab that shows it; drive(beside=page): another browser of a page.
+
+    Without a graphics card a picture takes a processor: a tab is small, unless a test looks at the picture (large).
+    """
     opened = []
 
-    def drive(robot="ufactory_xarm7", beside=None, phone=False, **options):
-        shape = {"viewport": {"width": 1400, "height": 1000}}
+    def drive(robot="ufactory_xarm7", beside=None, phone=False, large=False, **options):
+        shape = {"viewport": {"width": 1400, "height": 1000} if large else {"width": 800, "height": 600}}
         if phone:
             shape = {"viewport": {"width": 390, "height": 844}, "is_mobile": True, "has_touch": True}
-        if beside is not None:
-            shape = {"viewport": {"width": 800, "height": 600}}  # two pictures are slow without a graphics card
         tab = browser.new_page(**shape)
         if beside is not None:
             opened.append((None, None, tab))

@@ -20,8 +20,13 @@ PYTHON = pathlib.Path(sysconfig.get_paths()["include"])
 needs_compiler = pytest.mark.skipif(
     shutil.which("c++") is None or not EIGEN.exists(), reason="needs a compiler and Eigen"
 )
-USE_OF_RULE = """
+# One file for the rule, the option and the Python name of the status: the headers are most of the compiler's work.
+USE = """
+#include <pybind11/native_enum.h>
+#include <string_view>
+#include <sigmaik/servo.hpp>
 #include <sigmaik/velocity_solver.hpp>
+#include "servo_options.hpp"
 using namespace sigmaik;
 static_assert(Rule<JacobianTranspose> && std::is_convertible_v<JacobianTranspose, Method>);
 constexpr bool listed = [] {
@@ -33,12 +38,6 @@ static_assert(listed);
 Solution solve(const TaskJacobian& j, const TaskVector& x) {
   return VelocitySolver(JacobianTranspose{.alpha = 0.5}).solve(j, x);
 }
-"""
-USE_OF_OPTION = """
-#include <string_view>
-#include <sigmaik/servo.hpp>
-#include "servo_options.hpp"
-using sigmaik::bindings::Fields;
 constexpr bool told = std::apply(
     [](const auto&... fields) {
       const auto is_it = [](const auto& f) {
@@ -47,12 +46,15 @@ constexpr bool told = std::apply(
       };
       return (is_it(fields) || ...);
     },
-    Fields<sigmaik::ServoOptions>::all);
+    bindings::Fields<ServoOptions>::all);
 static_assert(told);
-double speed(const sigmaik::ServoOptions& options) { return options.hand_speed; }
+double speed(const ServoOptions& options) { return options.hand_speed; }
+namespace py = pybind11;
+void bind(py::module_& m) {
+  BINDING
+}
 """
 USE_OF_STATUS = """
-#include <cstdio>
 #include <cstring>
 #include <sigmaik/status.hpp>
 using sigmaik::Status;
@@ -76,6 +78,8 @@ def tree(tmp_path):
     """A copy of the headers and bindings."""
     for folder in ("cpp/include", "bindings"):
         shutil.copytree(ROOT / folder, tmp_path / folder)
+    (tmp_path / "cpp/src").mkdir()
+    shutil.copy(ROOT / "cpp/src/status.cpp", tmp_path / "cpp/src")
     return tmp_path
 
 
@@ -102,9 +106,8 @@ def with_bindings(root):
     return [f"-I{root / 'bindings'}", f"-isystem{PYTHON}", f"-isystem{pybind11.get_include()}", version]
 
 
-@needs_compiler
-def test_the_rule_of_the_example_is_two_files(tmp_path):
-    root = tree(tmp_path)
+def add_rule(root):
+    """Two files."""
     name, block = re.search(r"For example, `rules/(\w+\.hpp)`:\n\n   ```cpp\n(.*?)   ```", page(), re.S).groups()
     include = root / "cpp/include/sigmaik"
     (include / "rules" / name).write_text(textwrap.dedent(block), encoding="utf-8")
@@ -113,43 +116,49 @@ def test_the_rule_of_the_example_is_two_files(tmp_path):
         ("#include <sigmaik/rules/rule.hpp>", f"#include <sigmaik/rules/{name}>\n#include <sigmaik/rules/rule.hpp>"),
         ("using Rules = TypeList<", "using Rules = TypeList<JacobianTranspose, "),
     )
-    use = tmp_path / "use.cpp"
-    use.write_text(USE_OF_RULE, encoding="utf-8")
-    compiles(root, use, "-fsyntax-only")
 
 
-@needs_compiler
-def test_the_option_of_the_example_is_two_files(tmp_path):
-    root = tree(tmp_path)
-    options = with_bindings(root)
+def add_option(root):
+    """Two files."""
     member, field = blocks("An option of the servo", "cpp")
     put(root / "cpp/include/sigmaik/servo.hpp", ("struct ServoOptions {\n", f"struct ServoOptions {{\n{member}"))
     table = "struct Fields<ServoOptions> {\n  static constexpr std::tuple all{\n"
     put(root / "bindings/servo_options.hpp", (table, table + field))
-    use = tmp_path / "use.cpp"
-    use.write_text(USE_OF_OPTION, encoding="utf-8")
-    compiles(root, use, "-fsyntax-only", *options)
 
 
-@needs_compiler
-def test_the_status_of_the_example_is_three_files(tmp_path):
-    root = tree(tmp_path)
+def add_status(root):
+    """Three files."""
     value, text, name = blocks("A status", "cpp")
     put(
         root / "cpp/include/sigmaik/status.hpp",
         ("  Holding = 3,", f"{value}  Holding = 4,"),
         ("BadInput = 4,", "BadInput = 5,"),
     )
-    source = root / "status.cpp"
-    shutil.copy(ROOT / "cpp/src/status.cpp", source)
-    put(source, ("    case Status::Holding:", f"{text}    case Status::Holding:"))
+    put(root / "cpp/src/status.cpp", ("    case Status::Holding:", f"{text}    case Status::Holding:"))
+    put(root / "bindings/module.cpp", ('.value("HOLDING"', f'{name}.value("HOLDING"'))
+
+
+@needs_compiler
+def test_the_examples_of_rule_option_and_status_compile(tmp_path):
+    root = tree(tmp_path)
+    for add in (add_rule, add_option, add_status):
+        add(root)
+    module = (root / "bindings/module.cpp").read_text(encoding="utf-8")
+    (binding,) = re.findall(r"py::native_enum<Status>.*?\.finalize\(\);", module, re.S)
+    assert '"WAITING"' in binding
+    use = tmp_path / "use.cpp"
+    use.write_text(USE.replace("BINDING", binding), encoding="utf-8")
+    compiles(root, use, "-fsyntax-only", *with_bindings(root))
+
+
+@needs_compiler
+def test_the_status_of_the_example_has_its_text_and_its_place(tmp_path):
+    root = tree(tmp_path)
+    add_status(root)
     use = tmp_path / "use.cpp"
     use.write_text(USE_OF_STATUS, encoding="utf-8")
-    compiles(root, use, str(source), "-o", str(tmp_path / "use"))
+    compiles(root, use, str(root / "cpp/src/status.cpp"), "-o", str(tmp_path / "use"))
     assert subprocess.run([tmp_path / "use"]).returncode == 0
-    module = root / "bindings/module.cpp"
-    put(module, ('.value("HOLDING"', f'{name}.value("HOLDING"'))
-    compiles(root, module, "-fsyntax-only", *with_bindings(root))
 
 
 def test_the_cost_of_the_example_is_a_file_and_a_name_in_a_list(tmp_path):

@@ -2,6 +2,7 @@
 //
 //     sigmaik_settling [cases] [seed] [threads]   exit code 1 if a Servo does not come to rest or breaks a limit
 //     sigmaik_settling --case NUMBER              one case again, in words
+//     sigmaik_settling --table [cases] [seed]     the counts as CSV, a line for each property, for `sigmaik stress`
 //
 // A case is all its number says: arm, limits, rule, options, start and target. docs/reliability.md defines the counts.
 
@@ -16,6 +17,7 @@
 #include <cstring>
 #include <iterator>
 #include <mutex>
+#include <string>
 #include <thread>
 #include <vector>
 
@@ -28,6 +30,7 @@
 #include "methods.hpp"
 #include "random.hpp"
 #include "settling.hpp"
+#include "table.hpp"
 
 namespace {
 
@@ -203,9 +206,23 @@ void print(const char* name, const std::array<Count, kTargets>& counts) {
   }
 }
 
+void print_table(const Counts& counts) {
+  stress::print_head();
+  for (const auto* part : {&counts.servo, &counts.constrained}) {
+    Count sum;
+    for (const Count& c : *part) sum.add(c);
+    const std::string name = part == &counts.servo ? "" : " (constrained)";
+    stress::print_row("rest" + name, "targets that rest", sum.cases, sum.cases - sum.at_rest, sum.slowest,
+                      counts.failed);
+    stress::print_row("limits on the way to rest" + name, "targets that rest", sum.cases, sum.broken, 0.0,
+                      counts.failed);
+  }
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
+  const bool table = stress::takes_table(argc, argv);
   Counts total;
   if (argc == 3 && std::strcmp(argv[1], "--case") == 0) {
     run(static_cast<unsigned>(std::strtoul(argv[2], nullptr, 10)), true, total);
@@ -235,11 +252,15 @@ int main(int argc, char** argv) {
   work();
   for (std::thread& thread : pool) thread.join();
 
+  std::sort(total.failed.begin(), total.failed.end());
+  if (table) {
+    print_table(total);
+    return 0;  // what failed is in the table
+  }
   print("servo", total.servo);
   print("constrained", total.constrained);
   std::printf("%.1f s\n", std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
   if (total.failed.empty()) return 0;
-  std::sort(total.failed.begin(), total.failed.end());
   std::printf("FAILED: %zu cases; again with", total.failed.size());
   for (std::size_t i = 0; i < std::min<std::size_t>(10, total.failed.size()); ++i) {
     std::printf(" --case %u", total.failed[i]);

@@ -2,6 +2,7 @@
 //
 //     sigmaik_stress [cycles] [seed] [threads]   episodes until so many cycles are run; exit code 1 if anything failed
 //     sigmaik_stress --episode NUMBER            one episode again, in words
+//     sigmaik_stress --table [cycles] [seed]     the counts as CSV, a line for each property, for `sigmaik stress`
 //
 // An episode is all its number says: arm, limits, options, start and commands. docs/reliability.md defines the counts.
 
@@ -28,6 +29,7 @@
 
 #include "numbers.hpp"
 #include "random.hpp"
+#include "table.hpp"
 
 namespace {
 
@@ -744,9 +746,29 @@ void print(const Counts& c) {
   }
 }
 
+// The property of each count, and what its cases are. A new count is a Failure, its name, and a line here.
+void print_table(const Counts& c) {
+  stress::print_head();
+  const auto row = [&](Failure kind, const char* property, const char* of, long cases, double worst) {
+    stress::print_row(property, of, cases, c.failures[kind], worst, c.failed);
+  };
+  row(kPosition, "position limits", "joints x cycles", c.joint_cycles, c.worst[kPosition]);
+  row(kVelocity, "velocity limits", "joints x cycles", c.joint_cycles, c.worst[kVelocity]);
+  row(kAcceleration, "acceleration limits", "joints x cycles", c.joint_cycles, c.worst[kAcceleration]);
+  row(kJerk, "jerk limits", "joints x cycles", c.joint_cycles, c.worst[kJerk]);
+  row(kNotRecovered, "back inside in time", "joints that start outside", c.infeasible_joints, c.longest_recovery);
+  row(kNotFinite, "finite", "cycles", c.cycles, 0.0);
+  row(kNotSum, "continuity: q + dt qdot", "joints x cycles", c.joint_cycles, 0.0);
+  row(kUnasked, "rest where nothing is asked", "cycles", c.cycles, 0.0);
+  row(kRefused, "good input taken", "cycles", c.cycles - c.bad_inputs, 0.0);
+  row(kAccepted, "bad input refused", "bad inputs", c.bad_inputs, 0.0);
+  row(kReport, "report agrees with the motion", "cycles", c.cycles, 0.0);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
+  const bool table = stress::takes_table(argc, argv);
   if (argc == 3 && std::strcmp(argv[1], "--episode") == 0) {
     const Counts counts = Episode(static_cast<std::uint32_t>(std::strtoul(argv[2], nullptr, 10)), true).run();
     print(counts);
@@ -785,10 +807,14 @@ int main(int argc, char** argv) {
   work();
   for (std::thread& thread : pool) thread.join();
 
+  std::sort(total.failed.begin(), total.failed.end());
+  if (table) {
+    print_table(total);
+    return 0;  // what failed is in the table
+  }
   print(total);
   std::printf("%.1f s\n", std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
   if (!total.any()) return 0;
-  std::sort(total.failed.begin(), total.failed.end());
   std::printf("FAILED: %zu episodes; again with", total.failed.size());
   for (std::size_t i = 0; i < std::min<std::size_t>(10, total.failed.size()); ++i) {
     std::printf(" --episode %u", total.failed[i]);

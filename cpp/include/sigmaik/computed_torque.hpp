@@ -53,6 +53,8 @@ class ComputedTorque {
 
   /// Number n of movable joints.
   int dof() const noexcept { return dynamics_.dof(); }
+  /// The arm.
+  const Chain& chain() const noexcept { return dynamics_.chain(); }
   /// The settings, as given.
   const ComputedTorqueOptions& options() const noexcept { return options_; }
 

@@ -104,6 +104,7 @@ struct ConstrainedIkOptions {
   /// Use the closed form where the chain has one and its answer is inside the limits (35).
   bool analytic = true;
   LimitOptions limits{};  ///< which of the chain's limits are held; see limits.hpp
+  bool strict = false;    ///< see ServoOptions::strict
 };
 
 /// How a step was computed.
@@ -165,6 +166,7 @@ class ConstrainedIk {
   double settling_time() const noexcept { return tracker_.settling_time(); }
 
  private:
+  friend struct detail::Members<ConstrainedIk>;
   struct Linearisation;
   struct Closing;
   // The path ahead of the target, if the target goes on as it does: how fast each point may be passed.

@@ -27,6 +27,10 @@ class Dynamics {
   explicit Dynamics(const Chain& chain, const Eigen::Vector3d& gravity = {0.0, 0.0, -9.80665},
                     const std::optional<Inertia>& payload = std::nullopt);
   ~Dynamics();
+  /// The same arm, gravity and payload.
+  Dynamics(const Dynamics& other);
+  /// The same arm, gravity and payload.
+  Dynamics& operator=(const Dynamics& other);
   /// Takes over the model of another; the other may only be destroyed or assigned to.
   Dynamics(Dynamics&&) noexcept;
   /// Takes over the model of another; the other may only be destroyed or assigned to.
@@ -34,6 +38,12 @@ class Dynamics {
 
   /// Number n of movable joints.
   int dof() const noexcept;
+  /// The arm.
+  const Chain& chain() const noexcept;
+  /// (3,) [m/s²], in base axes, as given.
+  const Eigen::Vector3d& gravity() const noexcept;
+  /// The tip's load, as given.
+  const std::optional<Inertia>& payload() const noexcept;
 
   // The next calls are real time: noexcept, no heap. Arguments (n,) must have n entries, all finite.
 

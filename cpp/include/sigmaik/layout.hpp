@@ -24,6 +24,10 @@ struct Layout {
   static const char in_library;
 };
 
+/// The list of the members of a type, for values.hpp.
+template <typename Type>
+struct Members;
+
 template <typename... Types>
 using LayoutOf = Layout<Sized<Types, sizeof(Types)>...>;
 

@@ -84,6 +84,7 @@ class LeastSquares {
   void reset() noexcept { *this = LeastSquares{}; }
 
  private:
+  friend struct detail::Members<LeastSquares>;
   struct Guess {
     int unknowns = 0, inequalities = 0;
     std::uint32_t at_lower = 0, at_upper = 0, active = 0;

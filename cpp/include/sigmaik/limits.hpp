@@ -252,6 +252,7 @@ class LimitTracker {
 
  private:
   friend class detail::StopPath;  // follows the stop after a command
+  friend struct detail::Members<LimitTracker>;
   struct Window;
   // One number for each joint. Velocities keep their unit; all other quantities are in velocities and cycles: positions
   // [1/h], changes of velocity in a cycle, and changes of these changes, where h is the time of the coming cycle.

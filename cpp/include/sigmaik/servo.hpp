@@ -105,6 +105,9 @@ struct ServoOptions {
   /// What the arm must not touch: no command brings a pair of bodies nearer than the margin; see collisions.hpp. None:
   /// nothing is checked.
   std::optional<Collisions> collisions{};
+  /// In Python: whether update() raises an Error for a target that is no pose, in place of BadInput and a stop. C++
+  /// never throws in the loop.
+  bool strict = false;
 };
 
 /// What the guide of a servo does (ServoOptions::guided), for the pose target at hand.
@@ -320,6 +323,7 @@ class Servo {
 
  private:
   friend class detail::Guide;  // predicts with a servo of its own
+  friend struct detail::Members<Servo>;
   void begin(const JointRef& posture) noexcept;
   // Pose and Jacobian of the tip, with the tool, at the reference.
   void locate() noexcept;

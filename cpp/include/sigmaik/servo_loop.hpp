@@ -153,6 +153,8 @@ class ServoLoop {
   /// Stops the arm as fast as its limits allow, and latches: the arm rests until release(), whoever commands. Anyone
   /// may halt. Takes no lock.
   void halt() noexcept;
+  /// Whether the latch of halt(), or of a fault, is closed: also while no thread runs.
+  bool halted() const noexcept { return (latch_.load(std::memory_order_acquire) & 1u) != 0; }
   /// Opens the latch of halt(), or of a fault that is acknowledged. The arm rests until a new command comes.
   /// \throws Error where the arm does not rest yet, a fault is not acknowledged, somebody halts the arm at the same
   ///     time, or somebody else owns the arm

@@ -35,6 +35,7 @@
 ///     dynamics.hpp         Dynamics: mass matrix, Coriolis, gravity, payload
 ///     computed_torque.hpp  ComputedTorque: joint torques along a planned motion
 ///     constrained_ik.hpp   ConstrainedIk: a pose exactly in part, the rest as limits allow; time scaling
+///     values.hpp           save, load, same: values and states as bytes, for other processes
 ///
 /// To include by name:
 ///
@@ -93,4 +94,5 @@
 #include <sigmaik/target_stream.hpp>
 #include <sigmaik/task.hpp>
 #include <sigmaik/types.hpp>
+#include <sigmaik/values.hpp>
 #include <sigmaik/velocity_solver.hpp>

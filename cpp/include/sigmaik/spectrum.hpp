@@ -58,6 +58,7 @@ class Spectrum {
 
  private:
   friend struct detail::SpectrumParts;
+  friend struct detail::Members<Spectrum>;
   template <int kPadded>
   void decompose_padded(const TaskJacobianRef& jacobian) noexcept;
 

@@ -164,6 +164,7 @@ class TargetStream {
   const SampleCounts& counts() const noexcept { return counts_; }
 
  private:
+  friend struct detail::Members<TargetStream>;
   struct Sample {
     double time = 0.0;
     Pose pose = Pose::Identity();  ///< tip in base

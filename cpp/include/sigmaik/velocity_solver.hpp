@@ -81,6 +81,7 @@ class VelocitySolver {
   const Pace& pace() const noexcept { return pace_; }
 
  private:
+  friend struct detail::Members<VelocitySolver>;
   // The arguments of solve(), and their meaning for the task.
   struct Question {
     const TaskJacobianRef& jacobian;

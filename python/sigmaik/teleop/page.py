@@ -72,7 +72,7 @@ class Page:
         if parquet:
             need("pyarrow")
         self.session, self.recorder = session, Recorder(session, directory, parquet)
-        self._seat = seat.Seat()
+        self._seat = seat.Seat(session)
         self._device: TwistDevice | None = None
         self._device_of: Hashable | None = None  # the driver that the device works for
         self._device_held = False
@@ -123,6 +123,7 @@ class Page:
     def close(self) -> None:
         """Stops the arm and the server, and saves a recording that goes on."""
         self._closed.set()
+        self._seat.leave(self._seat.driver)
         self.session.hold("the page is closed")
         for thread in self._threads:
             thread.join(2.0)
@@ -185,7 +186,7 @@ class Page:
             client.add_notification(title, gauges.printable(text), color=color)
 
     def _follow(self, event: Any, target: TargetPose) -> None:
-        self._go(target)
+        self._go(event, target)
         self._scene.place_target(target.matrix)
         self._box_follows = False
         self._controls.position.value = tuple(np.round(target.matrix[:3, 3], 3).tolist())
@@ -195,17 +196,17 @@ class Page:
         self._box_follows = False
         at = self._scene.target
         target = TargetPose.from_page(at.position, at.wxyz).moved_to(position)
-        self._go(target)
+        self._go(event, target)
         self._scene.place_target(target.matrix)
 
     def _let_box_follow(self) -> None:
         """From now on the box shows where the tool rests, until somebody types."""
         self._shown_place, self._box_follows = self._controls.position.value, True
 
-    def _go(self, target: TargetPose) -> None:
+    def _go(self, event: Any, target: TargetPose) -> None:
         if self._replay is not None:
             raise sk.Error("a recording is replayed: end that first")
-        self.session.follow(target)
+        self.session.follow(target, self._seat.claim(event.client_id))
 
     def _tool(self) -> Array:
         latest = self.session.latest
@@ -217,7 +218,7 @@ class Page:
             if self._replay is not None:
                 raise sk.Error("a recording is replayed: end that first")
             self._let_box_follow()
-            self.session.twist(self._scaled(axis))
+            self.session.twist(self._scaled(axis), self._seat.claim(event.client_id))
 
         self._drive(event, jog)
 
@@ -236,7 +237,6 @@ class Page:
         self.session.hold(why)
 
     def _take_over(self, event: Any) -> None:
-        self.session.hold(f"browser {event.client_id} took over")
         self._seat.take_over(event.client_id)
 
     def _restart(self) -> None:
@@ -392,11 +392,11 @@ class Page:
             return
         if reading.held:
             try:
-                self._seat.claim(self._device_of)
+                token = self._seat.claim(self._device_of)
             except sk.Error:
                 return  # a browser took over
             self._let_box_follow()
-            self.session.twist(self._scaled(reading.twist))
+            self.session.twist(self._scaled(reading.twist), token)
         elif held and self._seat.driver == self._device_of:
             self.session.hold("the device's button was let go")
 

@@ -6,6 +6,7 @@ import dataclasses
 import math
 import pathlib
 import threading
+import time
 from typing import Any
 
 import numpy as np
@@ -33,7 +34,9 @@ class Session:
     the code that watches over the commander calls `refresh` while the commander is alive.
 
     A stop is latched: after `stop` every command is refused until `release`. A session that is left and entered again
-    does not move before a new command.
+    does not move before a new command. Whoever commands may own the arm (`take`): then commands need the token.
+
+    Stops, faults and the owner are those of the `ServoLoop` (docs/loop.md); the session adds the reasons, for people.
     """
 
     def __init__(
@@ -79,7 +82,10 @@ class Session:
         servo.reset(self.home)
         self._loop = sk.ServoLoop(servo, history=_power_of_two(2.0 * rate))
         self._goal: Array | None = None
-        self._stopped = ""
+        self._why_stopped = ""  # the loop says whether the arm is stopped
+        self._stops = 0
+        self._token: sk.LoopToken | None = None  # the owner's
+        self._goal_token: sk.LoopToken | None = None
         self._why_it_holds = "no command yet"
         self._lock = threading.RLock()
         self._latest: Samples | None = None
@@ -93,7 +99,10 @@ class Session:
 
     def __enter__(self) -> Session:
         with self._lock:
-            self._clear_fault()
+            if self._loop.fault is not None:
+                self._loop.acknowledge()
+                if not self._why_stopped:
+                    self._loop.release(*self._tokens())
             self._hold("no command yet")
             self._loop.start()
             return self
@@ -112,28 +121,52 @@ class Session:
 
     # --- commands
 
-    def follow(self, target: ArrayLike | TargetPose) -> None:
+    def take(self, who: str, take_over: bool = False) -> sk.LoopToken:
+        """Makes `who` the arm's owner, whose commands need the token that is returned. The arm holds.
+
+        Error where the arm has an owner, unless it is taken over on purpose. Anyone may stop and hold the arm.
+        """
+        with self._lock:
+            self._token = self._loop.take(who, take_over)
+            self._goal, self._why_it_holds = None, f"{who} took over"
+            return self._token
+
+    def give_back(self, token: sk.LoopToken) -> bool:
+        """Gives the arm back; the arm holds. Returns False where the token is not the owner's any more."""
+        with self._lock:
+            given = self._loop.give_back(token)
+            if given:
+                self._token = None
+                self._goal, self._why_it_holds = None, "nobody drives"
+            return given
+
+    @property
+    def owner(self) -> str:
+        """Who owns the arm; empty: nobody."""
+        return self._loop.owner
+
+    def follow(self, target: ArrayLike | TargetPose, token: sk.LoopToken | None = None) -> None:
         """Drives the tip to a pose (4, 4) in base. Error if the target is no pose, or more than 100 m away.
 
-        Error while the session is stopped.
+        Error while the session is stopped, and without the owner's token where the arm has an owner.
         """
         pose = TargetPose.of(target).matrix
         with self._lock:
             self._refuse_if_stopped()
-            self._loop.follow(pose, self.pose_timeout)
-            self._goal, self._why_it_holds = pose, "the target was not repeated in time"
+            self._loop.follow(pose, self.pose_timeout, token)
+            self._goal, self._goal_token, self._why_it_holds = pose, token, "the target was not repeated in time"
 
     def refresh(self) -> None:
         """Repeats the pose that the arm follows, so that the pose does not go stale."""
         with self._lock:
             if self._goal is not None and not self.stopped:
-                self._loop.follow(self._goal, self.pose_timeout)
+                self._loop.follow(self._goal, self.pose_timeout, self._goal_token)
 
-    def twist(self, twist: ArrayLike) -> None:
-        """Moves the tip along [v; ω] (6,) [m/s, rad/s], base axes, for `twist_timeout`. Error while stopped."""
+    def twist(self, twist: ArrayLike, token: sk.LoopToken | None = None) -> None:
+        """Moves the tip along [v; ω] (6,) [m/s, rad/s], base axes, for `twist_timeout`. Errors as those of `follow`."""
         with self._lock:
             self._refuse_if_stopped()
-            self._loop.follow_twist(twist, self.twist_timeout)
+            self._loop.follow_twist(twist, self.twist_timeout, token)
             self._goal, self._why_it_holds = None, "the twist was not repeated"
 
     def hold(self, why: str = "told to hold") -> None:
@@ -151,41 +184,58 @@ class Session:
     def stop(self, why: str = "Stop was pressed") -> None:
         """Stops as fast as the limits allow, and refuses every command until `release`."""
         with self._lock:
-            self._stopped = why
+            self._why_stopped = why
+            self._stops += 1
+            self._loop.halt()
             self._hold(why)
 
     def release(self) -> None:
-        """Ends a stop, and a fault of the loop. The arm holds until the next command.
+        """Ends a stop, and a fault of the loop, as soon as the arm rests. The arm holds until the next command.
 
-        Error where the loop has a fault and the arm does not rest yet.
+        Error where the arm does not rest in time (`ServoLoop.stop_time`), and where it is stopped once more meanwhile.
         """
         with self._lock:
-            fault = self._clear_fault()
-            if self._stopped or fault:
-                self._stopped = ""
-                self._hold("the stop was released; no command yet")
+            asked, fault = self._stops, self._loop.fault
+            deadline = time.monotonic() + self._loop.stop_time
+        while not self._try_to_release(asked, fault, time.monotonic() > deadline):
+            time.sleep(1e-3)
+
+    def _try_to_release(self, asked: int, fault: sk.LoopFault | None, last: bool) -> bool:
+        """Returns whether nothing is left to release. `last`: Error where the arm does not rest yet."""
+        with self._lock:
+            if self._stops != asked or self._loop.fault not in (None, fault):
+                raise sk.Error(f"stopped once more ({self.stopped}): release that stop")
+            if not self.stopped:
+                return True
+            if self._loop.state == sk.LoopState.STOPPING and not last:
+                return False
+            if self._loop.fault is not None:
+                self._loop.acknowledge()
+            self._loop.release(*self._tokens())
+            self._why_stopped = ""
+            self._hold("the stop was released; no command yet")
+            return True
 
     @property
     def stopped(self) -> str:
         """Why the session is stopped: by `stop`, or a fault of the loop; empty while commands are taken."""
         fault = self._loop.fault
-        return self._stopped or ("" if fault is None else f"fault: {fault.text}")
+        if fault is not None:
+            return f"fault: {fault.text}"
+        return (self._why_stopped or "the loop was halted") if self._loop.halted else ""
 
     @property
     def why_it_holds(self) -> str:
         """Why the arm holds, where it holds."""
         return self.stopped or self._why_it_holds
 
+    def _tokens(self) -> tuple[sk.LoopToken, ...]:
+        """The owner's token; none where nobody owns the arm."""
+        return () if self._token is None else (self._token,)
+
     def _refuse_if_stopped(self) -> None:
         if self.stopped:
             raise sk.Error(f"stopped ({self.stopped}): release the stop first")
-
-    def _clear_fault(self) -> bool:
-        if self._loop.fault is None:
-            return False
-        self._loop.acknowledge()
-        self._loop.release()
-        return True
 
     def restart(self, q: ArrayLike | None = None) -> None:
         """Puts the (simulated) arm at q (n,), by default where it started, and ends a recording's run of cycles.
@@ -197,7 +247,7 @@ class Session:
             self._hold("put back; no command yet")
             servo = self._settings.servo(self.chain, self._dt, self.home)
             servo.reset(self.home if q is None else q)
-            self._remember(self._loop.configure(servo, restart=True), self._settings)
+            self._remember(self._loop.configure(servo, restart=True, token=self._token), self._settings)
 
     @property
     def goal(self) -> Array | None:
@@ -215,7 +265,7 @@ class Session:
         with self._lock:
             settings = self._settings.with_(**changes)
             servo = settings.servo(self.chain, self._dt, self.home)
-            self._remember(self._loop.configure(servo), settings)
+            self._remember(self._loop.configure(servo, token=self._token), settings)
             self._settings = settings
             self._length_scale = servo.length_scale
 
@@ -313,7 +363,7 @@ class Session:
             self._journal = None if file is None else Journal(file, self._note())
             # The recording begins with a fresh servo, so that a replay gives the same bits.
             servo = self._settings.servo(self.chain, self._dt, self.home)
-            self._from = self._loop.configure(servo)
+            self._from = self._loop.configure(servo, token=self._token)
             self._remember(self._from, self._settings)
             self._recorded, self._recorded_cycles, self._recording_ended = [], 0, False
 
