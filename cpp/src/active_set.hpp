@@ -45,7 +45,7 @@ class ActiveSet {
         if (p_.inequalities == 0 && p_.objectives == 0 && p_.steps == 1) {
           // Rows C alone: if the guess is not the answer's set, the dual has a better guess.
           if (fits) {
-            std::copy_n(levels_.goal, P, p_.x);
+            for (int i = 0; i < P; ++i) p_.x[i] = std::min(std::max(levels_.goal[i], p_.lower[i]), p_.upper[i]);
             p_.finished = !release(false, 1.0);
             if (p_.finished) break;
           }
