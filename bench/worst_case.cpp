@@ -1,7 +1,8 @@
 // The slowest cycles of a servo, found by a search: hill climbing on counts of iterations, which have no noise.
 //
-//     sigmaik_worst_case search [joints] [evaluations] [restarts] [seed]   the worst input found, as a line for worst_inputs.hpp
-//     sigmaik_worst_case                                                   the kept inputs: counts, and times
+//     sigmaik_worst_case search [joints] [evaluations] [restarts] [seed]   the worst input found, as a line for
+//     worst_inputs.hpp sigmaik_worst_case                                                   the kept inputs: counts,
+//     and times
 //
 // The times are processor times of the measured cycle alone, each the least of several repeats, because a machine does
 // other things, too; beside them the same cycle of typical inputs.
@@ -99,8 +100,8 @@ void search(int joints, long evaluations, int restarts, unsigned seed) {
     worst = std::move(found);
   }
   const Work w = counts(worst, joints);
-  std::printf("    // %ld steps in %ld problems, %ld sweeps, %ld evaluations\n    {%d, \"", w.steps, w.problems, w.sweeps,
-              w.evaluations, joints);
+  std::printf("    // %ld steps in %ld problems, %ld sweeps, %ld evaluations\n    {%d, \"", w.steps, w.problems,
+              w.sweeps, w.evaluations, joints);
   for (const std::uint8_t gene : worst) std::printf("%02x", gene);
   std::printf("\"},\n");
 }

@@ -22,7 +22,9 @@ inline std::size_t genome_size(int joints) {
 }
 
 inline double part(std::uint8_t gene) { return gene / 255.0; }
-inline double decades(std::uint8_t gene, double low, double high) { return std::pow(10.0, low + (high - low) * part(gene)); }
+inline double decades(std::uint8_t gene, double low, double high) {
+  return std::pow(10.0, low + (high - low) * part(gene));
+}
 
 /// The servo after its cycle before, and the command of the next.
 struct Cycle {
@@ -39,7 +41,8 @@ inline sigmaik::Segment segment(const std::uint8_t* gene, int i, bool jerk) {
   const double right = 0.5 * std::numbers::pi;
   const std::array<double, 4> turns{0.0, right, -right, part(gene[0])};
   s.origin.linear() = Eigen::AngleAxisd(turns[gene[0] % 4], Eigen::Vector3d::UnitX()).toRotationMatrix();
-  s.origin.translation() = Eigen::Vector3d(gene[0] % 8 < 4 ? 0.0 : part(gene[1]), 0.0, gene[0] % 8 < 4 ? part(gene[1]) : 0.0);
+  s.origin.translation() = Eigen::Vector3d(gene[0] % 8 < 4 ? 0.0 : part(gene[1]), 0.0,
+                                           gene[0] % 8 < 4 ? part(gene[1]) : 0.0);
   const double q = 6.0 * part(gene[2]) - 3.0, range = decades(gene[3], -3.0, 0.7);
   s.lower = q - part(gene[4]) * range;
   s.upper = q + (1.0 - part(gene[4])) * range;
@@ -55,7 +58,7 @@ inline Cycle decode(const Genome& genome, int joints) {
   std::vector<sigmaik::Segment> segments;
   for (int i = 0; i < joints; ++i) segments.push_back(segment(gene + kJointGenes * i, i, jerk));
   sigmaik::ServoOptions options;
-  options.exact = {(genome[1] & 1) != 0, (genome[1] & 2) != 0, (genome[1] & 4) != 0,
+  options.exact = {(genome[1] & 1) != 0, (genome[1] & 2) != 0,  (genome[1] & 4) != 0,
                    (genome[1] & 8) != 0, (genome[1] & 16) != 0, (genome[1] & 32) != 0};
   if (genome[2] % 2 == 1) options.posture_gain = decades(genome[2], -1.0, 2.0);
   options.soft_start = 0.0;

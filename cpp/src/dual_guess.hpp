@@ -1,12 +1,14 @@
 #pragma once
 // The active set of a problem that has bounds and rows C alone, from its dual, as a first guess for active_set.hpp.
 //
-//     min ½|x|²,  C x = d,  lower ≤ x ≤ upper        has        x(y) = clamp(Cᵀy, lower, upper),  F(y) = C x(y) − d = 0.
+//     min ½|x|²,  C x = d,  lower ≤ x ≤ upper        has        x(y) = clamp(Cᵀy, lower, upper),  F(y) = C x(y) − d =
+//     0.
 //
-// F is the gradient of the convex, piecewise quadratic φ(y) = Σ_i h_i((Cᵀy)_i) − dᵀy, h_i' = clamp. Newton's method with
-// the matrix C D Cᵀ, D = 1 for the unknowns inside their bounds and 0 for the others, changes the whole set at once, and
-// ends where the set stays the same. With m ≤ 8 rows a step costs a fraction of a factorisation of the active set's, whose
-// number grows with the unknowns that change. C D Cᵀ squares the rows, so the set is a guess, and not the answer.
+// F is the gradient of the convex, piecewise quadratic φ(y) = Σ_i h_i((Cᵀy)_i) − dᵀy, h_i' = clamp. Newton's method
+// with the matrix C D Cᵀ, D = 1 for the unknowns inside their bounds and 0 for the others, changes the whole set at
+// once, and ends where the set stays the same. With m ≤ 8 rows a step costs a fraction of a factorisation of the active
+// set's, whose number grows with the unknowns that change. C D Cᵀ squares the rows, so the set is a guess, and not the
+// answer.
 
 #include <algorithm>
 #include <cmath>
@@ -41,6 +43,7 @@ class DualGuess {
 
  private:
   static constexpr int kSteps = 24, kMostRows = 8;
+  static constexpr double kLeast = 1e-8;
 
   SIGMAIK_INLINE double clamped(int i, double t) const { return std::min(std::max(t, p_.lower[i]), p_.upper[i]); }
 
@@ -63,7 +66,7 @@ class DualGuess {
     for (int k = 0; k < m_; ++k) f_[k] = dot<lanes>(p_.row[k], x) - p_.rhs[k];
   }
 
-  // change ← −(C D Cᵀ)⁻¹ F by Cholesky. Returns whether the matrix is positive definite.
+  // change ← −(C D Cᵀ)⁻¹ F by Cholesky. Returns false where a row is zero.
   SIGMAIK_INLINE bool newton(std::uint32_t free) {
     double a[kMostRows][kMostRows];
     alignas(32) double row[P];
@@ -76,10 +79,11 @@ class DualGuess {
         for (int i = 0; i < j; ++i) a[k][j] -= a[k][i] * a[j][i];
         a[k][j] /= a[j][j];
       }
-      const double whole = a[k][k];
+      // Where too few unknowns are free for the rows, the step is shorter in what they cannot change.
+      const double least = kLeast * dot<lanes>(p_.row[k], p_.row[k]);
       for (int i = 0; i < k; ++i) a[k][k] -= a[k][i] * a[k][i];
-      if (!(a[k][k] > 1e-15 * whole)) return false;
-      a[k][k] = std::sqrt(a[k][k]);
+      if (!(least > 0.0)) return false;
+      a[k][k] = std::sqrt(std::max(a[k][k], least));
     }
     for (int k = 0; k < m_; ++k) {
       double sum = -f_[k];

@@ -1,6 +1,6 @@
 #pragma once
-// Counts of a cycle's iterations, for bench/worst_case.cpp. Without SIGMAIK_COUNT_WORK nothing is counted, and nothing is
-// compiled.
+// Counts of a cycle's iterations, for bench/worst_case.cpp. Without SIGMAIK_COUNT_WORK nothing is counted, and nothing
+// is compiled.
 
 namespace sigmaik::detail {
 

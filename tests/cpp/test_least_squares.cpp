@@ -226,7 +226,8 @@ TEST_CASE("optimal, level by level: random, rank-deficient, degenerate and infea
   CHECK(limited == 0);
 }
 
-// The problems of a servo's redistribution: joints inside bounds, a slack for each row, and a guess from another problem.
+// The problems of a servo's redistribution: joints inside bounds, a slack for each row, and a guess from another
+// problem.
 TEST_CASE("many bounds change at once, and the steps stay few") {
   Random random(5);
   LeastSquares solver;
