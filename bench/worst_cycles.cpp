@@ -1,4 +1,5 @@
 // The slowest cycles that the search of worst_case.cpp has found, as benchmarks.
+#include <iterator>
 #include <string>
 
 #include <benchmark/benchmark.h>
@@ -17,6 +18,6 @@ void worst_cycle(benchmark::State& state) {
   }
   state.SetLabel(std::to_string(kept.joints) + " joints");
 }
-BENCHMARK(worst_cycle)->DenseRange(0, static_cast<int>(bench::kWorst.size()) - 1);
+BENCHMARK(worst_cycle)->DenseRange(0, static_cast<int>(std::size(bench::kWorst)) - 1);
 
 }  // namespace

@@ -13,7 +13,7 @@ struct Kept {
   const char* genes;  // two hexadecimal digits each
 };
 
-inline const std::vector<Kept> kWorst = {
+inline constexpr Kept kWorst[] = {
     // 214 steps without the guess of the dual (dual_guess.hpp), 35 with it
     {16,
      "424e05eadf18bcb4003c021b6566b9514cbad1d1d1634ae3071a4b2f32caa7b59714edbc12132ad38bdac094fbe4726f7e9c"
