@@ -10,7 +10,8 @@ export SKBUILD_BUILD_DIR := build/python
 export SKBUILD_CMAKE_DEFINE := SIGMAIK_WERROR=$(WERROR)
 
 .NOTPARALLEL:
-.PHONY: help demo docs lint test test-browser test-ros2 test-clang test-asan test-tsan stress bench wheel build install stubs \
+.PHONY: help demo docs lint test test-browser test-ros2 test-clang test-asan test-tsan fuzz stress bench wheel build install \
+        stubs \
         stubs-check clean system
 
 help:  ## this list
@@ -52,6 +53,14 @@ test-clang test-asan test-tsan: test-%: .venv/.build
 	cmake --preset $*
 	cmake --build --preset $*
 	ctest --preset $*
+
+FUZZ_SECONDS ?= 600
+fuzz: .venv/.test .venv/.package  ## fuzzers by clang on the URDF reader, the cycle and the recording reader; FUZZ_SECONDS=600
+	@tools/setup_system.sh $(PYTHON) clang
+	@tools/setup_system.sh $(PYTHON) libfuzzer
+	cmake --preset fuzz
+	cmake --build --preset fuzz
+	tools/fuzz.sh $(FUZZ_SECONDS)
 
 stress: build/release/build.ninja  ## ten million random cycles into every limit, 1e5 targets to settle at: counts of what failed
 	cmake --build build/release --target sigmaik_stress sigmaik_settling

@@ -59,8 +59,7 @@ void bind_rigid_body(py::module_& m) {
            py::arg("chain"), py::arg("gravity") = py::none(), py::arg("payload") = py::none(),
            "gravity: (3,) [m/s²] in base axes; by default 9.80665 m/s² along −z.\n"
            "payload: what the tip carries, in the tip's frame.\n\n"
-           "Raises Error where a link has a principal moment below 0, where a movable joint carries no link whose "
-           "inertia is known, and where the payload is no "
+           "Raises Error where a movable joint carries no link whose inertia is known, and where the payload is no "
            "body:\n"
            "a mass below 0, a tensor that is not symmetric, a principal moment beyond the sum of the other two.")
       .def_property_readonly("dof", &Dynamics::dof, "Number of movable joints, n.")

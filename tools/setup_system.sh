@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Installs the Debian or Ubuntu packages that the build needs and that are missing: setup_system.sh [PYTHON [COMMAND…]].
-# The commands are needed, too, from packages of the same name.
+# The commands are needed, too, from packages of the same name; libfuzzer stands for clang's fuzzer.
 # Says nothing where all is there.
 set -euo pipefail
 python=${1:-python3}
@@ -13,7 +13,15 @@ need g++
 need cmake
 need ninja ninja-build
 need ccache
-for command in "$@"; do need "$command"; done
+for command in "$@"; do
+  if [[ $command == libfuzzer ]]; then  # a package with clang's version in its name; needs clang
+    echo 'extern "C" int LLVMFuzzerTestOneInput(const char*, unsigned long) { return 0; }' |
+      clang++ -x c++ -fsanitize=fuzzer,address -o /dev/null - 2>/dev/null ||
+      missing+=("libclang-rt-$(clang++ -dumpversion | cut -d. -f1)-dev")
+  else
+    need "$command"
+  fi
+done
 
 libraries=(libeigen3-dev liborocos-kdl-dev liburdfdom-dev libconsole-bridge-dev libtinyxml2-dev
            doctest-dev libbenchmark-dev)

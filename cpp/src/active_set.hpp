@@ -17,6 +17,7 @@
 #include <cstdint>
 #include <limits>
 
+#include "dual_guess.hpp"
 #include "hierarchy.hpp"
 #include "lanes.hpp"
 
@@ -40,8 +41,23 @@ class ActiveSet {
       const bool cautious = idle > 12;
       const double doubt = idle > 30 ? 1e6 : cautious ? 1e3 : 1.0;
       if (guess_may_do) {
+        const bool fits = feasible();
+        if (p_.inequalities == 0 && p_.objectives == 0 && p_.steps == 1) {
+          // Rows C alone: if the guess is not the answer's set, the dual has a better guess.
+          if (fits) {
+            for (int i = 0; i < P; ++i) p_.x[i] = std::min(std::max(levels_.goal[i], p_.lower[i]), p_.upper[i]);
+            p_.finished = !release(false, 1.0);
+            if (p_.finished) break;
+          }
+          guess_by_dual();
+          continue;
+        }
+        if (!fits && p_.inequalities == 0) {
+          hold_all_beyond();
+          continue;
+        }
         guess_may_do = false;
-        if (feasible()) {
+        if (fits) {
           std::copy_n(levels_.goal, P, p_.x);
         } else {
           // Start inside the bounds, with the part of the guess that holds at the start.
@@ -112,6 +128,24 @@ class ActiveSet {
       if ((active_ >> k & 1u) == 0 && at_row(k, goal) > p_.rhs[k] + row_noise(k)) return false;
     }
     return true;
+  }
+
+  SIGMAIK_INLINE void guess_by_dual() {
+    DualGuess<lanes, P>(p_).find(at_lower_, at_upper_);
+    at_lower_ |= always_;
+    at_upper_ &= ~at_lower_;
+  }
+
+  // Holds each free variable whose goal is beyond a bound at this bound, all at once. Each call holds at least one
+  // variable, so a feasible goal comes after `unknowns` calls at the latest, and usually after two or three.
+  SIGMAIK_INLINE void hold_all_beyond() {
+    const auto& goal = levels_.goal;
+    const std::uint32_t is_held = held();
+    for (int i = 0; i < n_; ++i) {
+      if (is_held >> i & 1u) continue;
+      if (goal[i] > p_.upper[i] + slack(p_.upper[i])) at_upper_ |= 1u << i;
+      if (goal[i] < p_.lower[i] - slack(p_.lower[i])) at_lower_ |= 1u << i;
+    }
   }
 
   // Projects x into the bounds, and makes the inequalities active that x violates, or that the guess holds and x meets.

@@ -52,6 +52,10 @@ void check_inertia(const Segment& s) {
           " kg must be finite and not negative");
   require(inertia.center_of_mass.allFinite() && inertia.tensor.allFinite(), "link '", s.link_name,
           "': its inertia has an entry that is not finite");
+  const double least = detail::least_moment(inertia);
+  require(
+      least >= 0.0, "link '", s.link_name, "': a principal moment of its inertia is ", least,
+      " kg m², and no body has a negative one; correct the tensor, or leave the inertia out: only dynamics need it");
 }
 
 void check_origin(const Segment& s) {

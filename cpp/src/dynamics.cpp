@@ -113,13 +113,6 @@ Dynamics::Dynamics(const Chain& chain, const Eigen::Vector3d& gravity, const std
     const std::string defect = detail::inertia_defect(*payload);
     detail::require(defect.empty(), "payload: ", defect);
   }
-  for (const Segment& s : chain.segments()) {
-    if (!s.inertia) continue;
-    // Sums of principal moments that no body has are warned of by the chain: published tables of arms have them.
-    const double least = detail::least_moment(*s.inertia);
-    detail::require(least >= 0.0, "link '", s.link_name, "': a principal moment of its inertia is ", least,
-                    " kg m²; no body has a negative one: no dynamics");
-  }
   std::string waiting;  // the last movable joint, if no link after the joint has an inertia yet
   const auto check = [&] {
     detail::require(waiting.empty(), "joint '", waiting, "' carries no link whose inertia is known: no dynamics");

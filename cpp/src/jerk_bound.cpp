@@ -4,6 +4,7 @@
 
 #include "jerk_stop.hpp"
 #include "numbers.hpp"
+#include "work.hpp"
 
 namespace sigmaik::detail {
 namespace {
@@ -23,6 +24,7 @@ double largest_below_zero(double a, double fa, double b, double fb, Function f) 
     const double margin = 0.01 * (b - a);
     const double x = std::clamp(a + (b - a) * (fa / (fa - fb)), a + margin, b - margin);
     const double fx = f(x);
+    count_work(&Work::evaluations, 1);
     if (fx <= 0.0) {
       a = x;
       fa = fx;

@@ -7,6 +7,7 @@
 #include "active_set.hpp"
 #include "finite.hpp"
 #include "numbers.hpp"
+#include "work.hpp"
 
 namespace sigmaik {
 namespace {
@@ -152,6 +153,8 @@ LeastSquaresSolution solve_padded(const LeastSquaresProblem& p, int n, const Gue
   pack_rows(p, n, guess.active, packed);
   pack_bounds(p, n, guess, work);
   run<P>(work);
+  detail::count_work(&detail::Work::steps, work.steps);
+  detail::count_work(&detail::Work::problems, 1);
 
   LeastSquaresSolution s;
   s.x = Eigen::Map<const UnknownVector>(work.x, n);

@@ -5,6 +5,7 @@
 #include <functional>
 
 #include "jacobi.hpp"
+#include "work.hpp"
 
 namespace sigmaik {
 namespace {
@@ -201,6 +202,7 @@ void Spectrum::decompose_padded(const TaskJacobianRef& jacobian) noexcept {
 
   double factor;
   sweeps_ = run_scaled(work, k, jacobian, inner, outer, length, factor);
+  detail::count_work(&detail::Work::sweeps, sweeps_);
   const double noise = noise_square(work.square, k);
   std::array<int, kMaxTask> order{};
   sort_squares(work.square, k, noise, order);

@@ -12,6 +12,7 @@
 #include <Eigen/Geometry>
 
 #include "numbers.hpp"
+#include "urdf_scan.hpp"
 
 namespace sigmaik::detail::xml {
 namespace {
@@ -98,6 +99,9 @@ Source read(const std::string& source) {
   if (!std::filesystem::exists(status) || source.find('\0') != std::string::npos) fail(result.label, ": no such file");
   if (std::filesystem::is_directory(status)) fail(result.label, ": is a directory, not a file");
   if (!std::filesystem::is_regular_file(status)) fail(result.label, ": is not a regular file");
+  const auto size = std::filesystem::file_size(source, error);
+  require(error || size <= kLargestText, result.label, ": has ", size, " bytes, and more than ", kLargestText,
+          " are not read");
   std::ifstream file(source, std::ios::binary);
   if (!file) fail(result.label, ": cannot be opened: ", std::strerror(errno));
   std::vector<char> part(1 << 16);
@@ -111,6 +115,7 @@ Source read(const std::string& source) {
 
 const XMLElement& parse(const std::string& xml, tinyxml2::XMLDocument& document) {
   require(xml.find('\0') == std::string::npos, "malformed XML: it holds a NUL byte");
+  check_bounds(xml);
   if (document.Parse(xml.data(), xml.size()) != tinyxml2::XML_SUCCESS) {
     fail("malformed XML in line ", document.ErrorLineNum(), " (", document.ErrorName(), ")");
   }

@@ -225,3 +225,33 @@ TEST_CASE("optimal, level by level: random, rank-deficient, degenerate and infea
   CHECK(failed == 0);
   CHECK(limited == 0);
 }
+
+// The problems of a servo's redistribution: joints inside bounds, a slack for each row, and a guess from another
+// problem.
+TEST_CASE("many bounds change at once, and the steps stay few") {
+  Random random(5);
+  LeastSquares solver;
+  int most = 0;
+  long sum = 0;
+  constexpr int kProblems = 3000, kJoints = 16, kRows = 6;
+  for (int i = 0; i < kProblems; ++i) {
+    LeastSquaresProblem p;
+    p.C = RowMatrix::Zero(kRows, kJoints + kRows);
+    p.C.leftCols(kJoints) = random.matrix(kRows, kJoints);
+    p.C.rightCols(kRows).diagonal().setConstant(random.decades(-3.0, 0.0));
+    p.d = random.decades(-1.0, 1.5) * random.vector(kRows);
+    p.lower = UnknownVector::Constant(kJoints + kRows, -kInfinity);
+    p.upper = UnknownVector::Constant(kJoints + kRows, kInfinity);
+    for (int j = 0; j < kJoints; ++j) {
+      p.lower[j] = random.uniform(-1.0, 0.5);
+      p.upper[j] = p.lower[j] + random.decades(-3.0, 0.5);
+    }
+    const LeastSquaresSolution s = solver.solve(p);
+    REQUIRE(s.status == LeastSquaresStatus::Optimal);
+    most = std::max(most, s.steps);
+    sum += s.steps;
+  }
+  MESSAGE("steps: mean ", static_cast<double>(sum) / kProblems, ", most ", most);
+  CHECK(sum <= 4 * kProblems);
+  CHECK(most <= 24);
+}

@@ -59,13 +59,16 @@ IDS = [name.rsplit("/")[-1] for name, _, _ in ARMS]
 
 @functools.cache
 def read(path):
-    """(links in order, {child: joint element}) of a URDF; None where it is not XML."""
+    """(links in order, {child: joint element}, {link: <inertia>}) of a URDF; None where it is not XML."""
     try:
         robot = ET.parse(path).getroot()
     except ET.ParseError:
         return None
     links = [link.get("name") for link in robot.findall("link")]
-    return links, {joint.find("child").get("link"): joint for joint in robot.findall("joint")}
+    inertias = {
+        link.get("name"): e for link in robot.findall("link") if (e := link.find("inertial/inertia")) is not None
+    }
+    return links, {joint.find("child").get("link"): joint for joint in robot.findall("joint")}, inertias
 
 
 def path_to(joints, tip):
@@ -85,8 +88,19 @@ def movable(path):
     return [joint for joint in path if joint.get("type") != "fixed"]
 
 
-def is_arm(path):
-    """Whether sigmaik should accept the path."""
+def has_negative_moment(element):
+    entry = {name: float(value) for name, value in element.attrib.items()}
+    xx, xy, xz, yy, yz, zz = (entry[name] for name in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"))
+    tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    return np.linalg.eigvalsh(tensor)[0] < -1e-12 - 1e-9 * np.abs(tensor).max()
+
+
+def is_arm(path, inertias):
+    """Whether sigmaik should accept the path. inertias: {link: <inertia>}."""
+    if any(
+        has_negative_moment(inertias[link]) for joint in path if (link := joint.find("child").get("link")) in inertias
+    ):
+        return False
     for joint in movable(path):
         limit = joint.find("limit")
         if joint.get("type") in ("floating", "planar") or joint.find("mimic") is not None:
@@ -162,11 +176,11 @@ def test_every_path(name):
             sk.Chain.from_urdf(path)
         return
     rng = np.random.default_rng(SEED)
-    links, joints = read(path)
+    links, joints, inertias = read(path)
     text = path.read_text(encoding="utf-8")
     for leaf in leaves(links, joints):
         arm = path_to(joints, leaf)
-        if not is_arm(arm):
+        if not is_arm(arm, inertias):
             with pytest.raises(sk.Error):
                 sk.Chain.from_urdf(text, tip=leaf)
             continue
@@ -185,8 +199,11 @@ def test_every_path(name):
 
 def test_most_paths_are_arms():
     """The test above would pass if it refused every URDF: this test counts the comparisons."""
-    paths = [path_to(file[1], leaf) for file in map(read, FILES.values()) if file for leaf in leaves(*file)]
-    assert sum(map(is_arm, paths)) > 500
+    files = [file for file in map(read, FILES.values()) if file]
+    arms = [
+        is_arm(path_to(joints, leaf), inertias) for links, joints, inertias in files for leaf in leaves(links, joints)
+    ]
+    assert sum(arms) > 500
 
 
 @pytest.mark.parametrize(("name", "tip", "dof"), ARMS, ids=IDS)

@@ -144,8 +144,9 @@ class ConstrainedIk {
   /// \throws Error where a size is wrong or an entry is not finite
   void reset(const JointRef& q, const JointRef& qdot = JointVector());
 
-  /// One cycle towards a pose of the tip in base. Real time. If the target is not a pose, the status is BadInput and
-  /// the arm stops.
+  /// One cycle towards a pose of the tip in base. Real time: each iteration of the options solves one problem
+  /// (LeastSquares::solve), an arrival a few more, and a preview makes at most 24 points. If the target is not a pose,
+  /// the status is BadInput and the arm stops.
   ConstrainedIkStep update(const Pose& target) noexcept;
   /// The older name of update().
   ConstrainedIkStep step(const Pose& target) noexcept { return update(target); }

@@ -21,8 +21,8 @@ class Dynamics {
  public:
   /// \param gravity [m/s²], in base axes
   /// \param payload the tip's load: centre of mass in the tip's frame, tensor about this centre in the tip's axes
-  /// \throws Error where a link has a principal moment below 0, where a movable joint carries no link whose inertia is
-  ///     known, where gravity is not finite, or where the payload is no body: a mass below 0, a tensor that is not
+  /// \throws Error where a movable joint carries no link whose inertia is known, where gravity is not finite, or where
+  /// the payload is no body: a mass below 0, a tensor that is not
   ///     symmetric, or a principal moment beyond the sum of the other two
   explicit Dynamics(const Chain& chain, const Eigen::Vector3d& gravity = {0.0, 0.0, -9.80665},
                     const std::optional<Inertia>& payload = std::nullopt);

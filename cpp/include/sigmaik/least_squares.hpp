@@ -77,7 +77,8 @@ struct LeastSquaresSolution {
 /// answer is unique to rounding, the answer does not depend on the guess.
 class LeastSquares {
  public:
-  /// Real time: no heap, a bounded number of steps.
+  /// Real time: no heap, at most 4 (n + k) + 40 steps for n unknowns and k rows of G, and 24 steps of Newton's method
+  /// in the rows of C.
   LeastSquaresSolution solve(const LeastSquaresProblem& problem) noexcept;
 
   /// Forgets the guess.

@@ -250,8 +250,9 @@ class Servo {
   /// (n,) measured minus commanded position, filtered; zero before measure().
   const JointVector& following_error() const noexcept { return following_error_; }
 
-  /// One cycle towards a pose of the tip in base. Real time. A target that is not a pose is refused: BadInput, and the
-  /// arm stops. A rotation within kRotationTolerance is made one (nearest_pose()), and counted where is_rough().
+  /// One cycle towards a pose of the tip in base. Real time: at most 3 decompositions (Spectrum::decompose) and 14
+  /// problems (LeastSquares::solve), as all commands. A target that is not a pose is refused: BadInput, and the arm
+  /// stops. A rotation within kRotationTolerance is made one (nearest_pose()), and counted where is_rough().
   /// \param feedforward twist [v; ω] of a target that moves, base axes, at the target's origin; added to gain × error,
   ///     after the error's caps. Behind a target of constant twist the tip lags by speed/gain without the feedforward,
   ///     and not at all with it.

@@ -24,7 +24,8 @@ namespace sigmaik {
 /// Result and warm start of decompose(). No heap. Start afresh by assigning Spectrum{}.
 class Spectrum {
  public:
-  /// Decomposes an m×n matrix of finite entries. Real time.
+  /// Decomposes an m×n matrix of finite entries. Real time: at most 30 sweeps, where a cold start takes about 5 and a
+  /// warm start 3.
   ///
   /// Singular vectors of a zero singular value are not unique: they continue the last cycle's where there
   /// is one, and are otherwise the same on every machine and run. Signs continue too.
