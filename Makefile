@@ -11,8 +11,7 @@ export SKBUILD_CMAKE_DEFINE := SIGMAIK_WERROR=$(WERROR)
 
 .NOTPARALLEL:
 .PHONY: help demo docs lint test test-browser test-ros2 test-clang test-asan test-tsan fuzz stress bench wheel build install \
-        stubs \
-        stubs-check clean system
+        stubs stubs-check clean system
 
 help:  ## this list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1  /p' Makefile | awk '{printf "  %s %-12s", $$1, $$2; $$1=$$2=""; print}'
