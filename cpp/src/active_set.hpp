@@ -17,7 +17,6 @@
 #include <cstdint>
 #include <limits>
 
-#include "dual_guess.hpp"
 #include "hierarchy.hpp"
 #include "lanes.hpp"
 
@@ -41,23 +40,13 @@ class ActiveSet {
       const bool cautious = idle > 12;
       const double doubt = idle > 30 ? 1e6 : cautious ? 1e3 : 1.0;
       if (guess_may_do) {
-        const bool fits = feasible();
-        if (p_.inequalities == 0 && p_.objectives == 0 && p_.steps == 1) {
-          // Rows C alone: if the guess is not the answer's set, the dual has a better guess.
-          if (fits) {
-            for (int i = 0; i < P; ++i) p_.x[i] = std::min(std::max(levels_.goal[i], p_.lower[i]), p_.upper[i]);
-            p_.finished = !release(false, 1.0);
-            if (p_.finished) break;
-          }
-          guess_by_dual();
-          continue;
-        }
-        if (!fits && p_.inequalities == 0) {
+        const bool feasible_goal = feasible();
+        if (!feasible_goal && p_.inequalities == 0) {
           hold_all_beyond();
           continue;
         }
         guess_may_do = false;
-        if (fits) {
+        if (feasible_goal) {
           std::copy_n(levels_.goal, P, p_.x);
         } else {
           // Start inside the bounds, with the part of the guess that holds at the start.
@@ -128,12 +117,6 @@ class ActiveSet {
       if ((active_ >> k & 1u) == 0 && at_row(k, goal) > p_.rhs[k] + row_noise(k)) return false;
     }
     return true;
-  }
-
-  SIGMAIK_INLINE void guess_by_dual() {
-    DualGuess<lanes, P>(p_).find(at_lower_, at_upper_);
-    at_lower_ |= always_;
-    at_upper_ &= ~at_lower_;
   }
 
   // Holds each free variable whose goal is beyond a bound at this bound, all at once. Each call holds at least one

@@ -77,8 +77,7 @@ struct LeastSquaresSolution {
 /// answer is unique to rounding, the answer does not depend on the guess.
 class LeastSquares {
  public:
-  /// Real time: no heap, at most 4 (n + k) + 40 steps for n unknowns and k rows of G, and 24 steps of Newton's method
-  /// in the rows of C.
+  /// Real time: no heap, at most 4 (n + k) + 40 steps for n unknowns and k rows of G.
   LeastSquaresSolution solve(const LeastSquaresProblem& problem) noexcept;
 
   /// Forgets the guess.
