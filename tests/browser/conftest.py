@@ -68,15 +68,17 @@ class Driven:
 
     def picture(self):
         """(height, width, 3) what the tab shows, once it does not change any more."""
-        last, end = self._picture(), time.monotonic() + PATIENCE
+        last, end = self.shot(), time.monotonic() + PATIENCE
         while time.monotonic() < end:
-            now = self._picture()
-            if np.abs(now - last).max() < 30.0:
+            now = self.shot()
+            beside = slice(0, 5 * now.shape[1] // 8)  # the panel, whose figures change, is on the right
+            if np.abs(now - last)[:, beside].max() < 30.0:
                 return now
             last = now
         raise AssertionError("the picture does not come to rest")
 
-    def _picture(self):
+    def shot(self):
+        """(height, width, 3) what the tab shows now."""
         return np.asarray(Image.open(io.BytesIO(self.tab.screenshot())).convert("RGB"), dtype=float)
 
     def control(self, label):

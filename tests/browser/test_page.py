@@ -24,14 +24,14 @@ def keep(tab, name):
 
 def test_it_loads_and_draws_the_arm(drive):
     page = drive(large=True)
-    page.wait(lambda: page.picture()[WHERE].std() > 5.0, "the arm in the picture")
+    page.wait(lambda: page.shot()[WHERE].std() > 5.0, "the arm in the picture")
     assert page.errors == []
     with_arm = page.picture()
     page.server._scene.robot._view.show_visual = False
     page.server._scene.ellipsoid.visible = False
 
     def pixels():
-        changed = np.abs(with_arm - page.picture()).max(axis=2) > 30.0
+        changed = np.abs(with_arm - page.shot()).max(axis=2) > 30.0
         return changed[WHERE].sum()
 
     page.wait(lambda: pixels() > 2000, "the arm's pixels are gone")
@@ -290,12 +290,12 @@ def test_it_has_a_title_a_legend_and_a_layout_for_a_phone(drive):
 
 def test_the_view_shows_the_arm_large(drive):
     page = drive(large=True)
-    page.wait(lambda: page.picture()[WHERE].std() > 5.0, "the arm in the picture")
+    page.wait(lambda: page.shot()[WHERE].std() > 5.0, "the arm in the picture")
     with_arm = page.picture()
     page.server._scene.robot._view.show_visual = False
 
     def rows():
-        changed = np.abs(with_arm - page.picture()).max(axis=2)[:, :1000] > 30.0  # beside the panel
+        changed = np.abs(with_arm - page.shot()).max(axis=2)[:, :1000] > 30.0  # beside the panel
         return np.flatnonzero(changed.sum(axis=1) > 3)
 
     page.wait(lambda: len(rows()) > 0 and rows()[-1] - rows()[0] > 250, "250 rows of 1000 are the arm's")
