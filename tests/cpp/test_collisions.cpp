@@ -72,7 +72,7 @@ const std::vector<LinkCapsule>& capsules_of(const Chain& chain) {
 }
 
 Collisions collisions_of(const Chain& chain, const std::vector<Obstacle>& obstacles, double margin) {
-  return {chain, capsules_of(chain), obstacles, {.margin = margin}};
+  return Collisions::with_capsules(chain, capsules_of(chain), obstacles, {.margin = margin});
 }
 
 Case random_case(test::Random& random, const Chain& chain) {
@@ -201,7 +201,7 @@ TEST_CASE("rows are the derivatives of distances") {
   for (int i = 0; i < 400; ++i) {
     const Obstacle o = random_obstacle(random, 0.5);
     const std::vector<LinkCapsule> ball{{"flange", {Vector3(0.02, 0.0, 0.05), Vector3(0.02, 0.0, 0.05), 0.04}}};
-    const Collisions collisions(chain, ball, {o}, {.margin = 0.0});
+    const Collisions collisions = Collisions::with_capsules(chain, ball, {o}, {.margin = 0.0});
     const JointVector q = test::sample(random, chain);
     sigmaik::LimitTracker tracker(chain.limits());
     tracker.reset(q);
