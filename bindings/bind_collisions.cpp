@@ -190,7 +190,7 @@ void bind_setup(py::class_<Collisions>& c) {
                     const std::optional<std::vector<LinkCapsule>>& arm) {
           const CollisionOptions options = options_of(self_collision, margin, source, srdf, radius, capsules, ignore);
           const std::vector<Obstacle> world = obstacles_argument(obstacles);
-          return arm ? Collisions(chain, *arm, world, options) : Collisions(chain, world, options);
+          return arm ? Collisions::with_capsules(chain, *arm, world, options) : Collisions(chain, world, options);
         }),
         py::arg("chain"), py::arg("obstacles") = py::none(), py::arg("self_collision") = true, py::arg("margin") = 0.01,
         py::kw_only(), py::arg("source") = py::none(), py::arg("srdf") = py::none(), py::arg("radius") = 0.05,

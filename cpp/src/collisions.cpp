@@ -330,8 +330,8 @@ Obstacle Obstacle::half_space(const Eigen::Vector3d& point, const Eigen::Vector3
 Collisions::Collisions(const Chain& chain, const std::vector<Obstacle>& obstacles, const CollisionOptions& options)
     : model_(Builder(chain, options).build(fitted(chain, options), obstacles)) {}
 
-Collisions::Collisions(const Chain& chain, const std::vector<LinkCapsule>& arm, const std::vector<Obstacle>& obstacles,
-                       const CollisionOptions& options) {
+Collisions Collisions::with_capsules(const Chain& chain, const std::vector<LinkCapsule>& arm,
+                                     const std::vector<Obstacle>& obstacles, const CollisionOptions& options) {
   const LinkFrames frames(chain);
   std::vector<FittedCapsule> capsules;
   for (std::size_t i = 0; i < arm.size(); ++i) {
@@ -341,7 +341,7 @@ Collisions::Collisions(const Chain& chain, const std::vector<LinkCapsule>& arm, 
     const int segment = segment_of(chain, arm[i].link);
     capsules.push_back({segment, arm[i].capsule, arm[i].excess, {segment}});
   }
-  model_ = Builder(chain, options).build(std::move(capsules), obstacles);
+  return Collisions(Builder(chain, options).build(std::move(capsules), obstacles));
 }
 
 void Collisions::move(int i, const Pose& pose, const Twist& twist) {

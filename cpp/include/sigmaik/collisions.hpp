@@ -140,9 +140,9 @@ class Collisions {
   ///     gives a link no shape that can be read
   explicit Collisions(const Chain& chain, const std::vector<Obstacle>& obstacles = {},
                       const CollisionOptions& options = {});
-  /// With capsules of the application's own.
-  Collisions(const Chain& chain, const std::vector<LinkCapsule>& arm, const std::vector<Obstacle>& obstacles,
-             const CollisionOptions& options = {});
+  /// The same with capsules of the application's own.
+  static Collisions with_capsules(const Chain& chain, const std::vector<LinkCapsule>& arm,
+                                  const std::vector<Obstacle>& obstacles = {}, const CollisionOptions& options = {});
 
   /// Moves obstacle i, from any thread. Takes a lock that no servo waits for.
   /// \param twist [v; ω] of the obstacle's origin, base axes: until the next call it goes on like this, for at most
@@ -179,6 +179,8 @@ class Collisions {
   const std::shared_ptr<detail::CollisionModel>& model() const noexcept { return model_; }
 
  private:
+  explicit Collisions(std::shared_ptr<detail::CollisionModel> model) noexcept : model_(std::move(model)) {}
+
   std::shared_ptr<detail::CollisionModel> model_;
 };
 

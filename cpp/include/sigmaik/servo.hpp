@@ -39,6 +39,8 @@ class Owner {
  private:
   std::unique_ptr<T> owned_;
 };
+extern template class Owner<Guide>;  // each is instantiated where its type is known
+extern template class Owner<CollisionGuard>;
 
 }  // namespace sigmaik::detail
 
