@@ -24,4 +24,7 @@ Owner<T>& Owner<T>::operator=(Owner other) noexcept {
 template <typename T>
 Owner<T>::~Owner() = default;
 
+extern template class Owner<Guide>;
+extern template class Owner<CollisionGuard>;
+
 }  // namespace sigmaik::detail

@@ -78,9 +78,6 @@ class Tree {
   // The joints from base to tip.
   std::vector<const TreeJoint*> path(const std::string& base, const std::string& tip) const;
 
-  // Whether the file has this link.
-  bool has_link(const std::string& name) const { return links_.count(name) != 0; }
-
   // The joint with this name, or null.
   const TreeJoint* joint(const std::string& name) const;
 
