@@ -346,9 +346,9 @@ TEST_CASE("the watch sees a lock, an allocation, and a system call") {
 }
 
 TEST_CASE("every call that a header marks real time takes no heap, no lock and no system call") {
-  for (const auto& [name, work] : all_calls()) {
-    INFO("the call: ", name);
-    const test::Quiet quiet = test::quiet_of(work);
+  for (const auto& call : all_calls()) {
+    INFO("the call: ", call.first);
+    const test::Quiet quiet = test::quiet_of(call.second);
     CHECK(quiet.finished);
     CHECK(quiet.heap == 0);
     CHECK(quiet.locks == 0);
@@ -378,14 +378,14 @@ TEST_CASE("every function that a header marks real time is called above") {
   CHECK(marks["dynamics.hpp forward_dynamics"] == 1);
   CHECK(marks["singularities.hpp potential"] == 3);
   test::Marks called{{"servo_loop.hpp measure", 1}};
-  for (const auto& [name, work] : all_calls()) ++called[name];
-  for (const auto& [name, count] : marks) {
-    INFO("the function: ", name);
-    CHECK(called[name] == count);
+  for (const auto& call : all_calls()) ++called[call.first];
+  for (const auto& mark : marks) {
+    INFO("the function: ", mark.first);
+    CHECK(called[mark.first] == mark.second);
   }
-  for (const auto& [name, count] : called) {
-    INFO("the function: ", name);
-    CHECK(marks[name] == count);
+  for (const auto& call : called) {
+    INFO("the function: ", call.first);
+    CHECK(marks[call.first] == call.second);
   }
 }
 
