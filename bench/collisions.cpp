@@ -1,4 +1,6 @@
 // A cycle of a servo among obstacles: xArm7 with its 10 capsules, and 10 obstacles.
+#include <optional>
+#include <utility>
 #include <vector>
 
 #include <benchmark/benchmark.h>

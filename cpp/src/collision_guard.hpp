@@ -49,9 +49,9 @@ class CollisionGuard {
 
  private:
   static constexpr double kRounding = 1e-10;  // [m] a distance that is missed by less is kept
-  static constexpr int kListed = 64;     // pairs that are verified together
-  static constexpr int kLooks = 32;      // most configurations of one verification
-  static constexpr int kBisections = 4;  // of the way from the stop to the command
+  static constexpr int kListed = 64;          // pairs that are verified together
+  static constexpr int kLooks = 32;           // most configurations of one verification
+  static constexpr int kBisections = 4;       // of the way from the stop to the command
 
   // How fast a motion is braked: see collisions.hpp.
   struct Braking {
