@@ -6,6 +6,7 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 #include <limits>
 #include <optional>
 #include <string>
@@ -187,7 +188,7 @@ class Reader {
     using Bits = std::array<std::uint8_t, sizeof(T)>;
     Bits bits{};
     const std::string_view part = take(sizeof(T));
-    std::copy(part.begin(), part.end(), bits.begin());
+    std::memcpy(bits.data(), part.data(), sizeof(T));
     if constexpr (std::endian::native == std::endian::big) std::reverse(bits.begin(), bits.end());
     if constexpr (std::is_same_v<T, bool>) {
       require(bits[0] <= 1, "a truth value is ", int{bits[0]});

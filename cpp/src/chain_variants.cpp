@@ -70,7 +70,9 @@ Chain Chain::with_tool(const Pose& pose, const std::optional<Inertia>& inertia) 
   tool.inertia = inertia;
   std::vector<Segment> segments = model_->segments;
   segments.push_back(std::move(tool));
-  return Chain(model_->base, std::move(segments));
+  Chain out(model_->base, std::move(segments));
+  out.urdf_ = urdf_;
+  return out;
 }
 
 Chain Chain::lock(const std::map<std::string, double>& positions) const {
@@ -93,7 +95,9 @@ Chain Chain::lock(const std::map<std::string, double>& positions) const {
     if (lock == positions.end()) continue;
     segments[i] = fixed_at(couplings[i].multiplier * lock->second + couplings[i].offset, segments[i]);
   }
-  return Chain(model_->base, std::move(segments));
+  Chain out(model_->base, std::move(segments));
+  out.urdf_ = urdf_;
+  return out;
 }
 
 JointMatrix Chain::coupling_matrix() const {

@@ -398,7 +398,7 @@ TEST_CASE("set-up refuses what makes no sense, with the facts") {
   fails([&] { Collisions(chain, std::vector<Obstacle>(40, Obstacle::sphere({9.0, 0.0, 0.0}, 0.1))); }, "at most 32");
   Collisions collisions(chain);
   fails([&] { collisions.move(0, Pose::Identity()); }, "no obstacle 0");
-  fails([&] { collisions.attach(std::vector<Capsule>(5, Capsule{{}, {}, 0.1})); }, "at most 4");
+  fails([&] { collisions.attach(std::vector<Capsule>(5)); }, "at most 4");
   ServoOptions options;
   options.collisions = collisions;
   fails([&] { Servo(test::arms().at("franka_panda"), sigmaik::JParse{}, options); }, "another arm");
@@ -416,7 +416,7 @@ TEST_CASE("cycles among obstacles, and moves of these, need no heap") {
   Servo servo(chain, sigmaik::JParse{}, options);
   servo.reset(c.q);
   const Pose target = sigmaik::pose(chain, test::sample(random, chain)), place = random.pose(0.8);
-  const std::vector<Capsule> object{{{}, {0.0, 0.0, 0.1}, 0.03}};
+  const std::vector<Capsule> object{{Eigen::Vector3d::Zero(), {0.0, 0.0, 0.1}, 0.03}};
   options.collisions->attach(object);
   const test::HeapWatch watch;
   for (int i = 0; i < 1000; ++i) {
