@@ -100,7 +100,8 @@ build/release/build.ninja: CMakePresets.json | system
 
 # .build, .demo, .docs, .test, .bench: the packages that building, the demo, the site, the tests and the benchmarks need.
 .venv/.build .venv/.demo .venv/.docs .venv/.test .venv/.bench: .venv/.%: .venv/pyvenv.cfg pyproject.toml tools/requirements.py
-	$(BIN)/python -m pip install -q --no-compile $$($(BIN)/python tools/requirements.py $*)
+	$(BIN)/python tools/requirements.py $* > .venv/$*.txt
+	$(BIN)/python -m pip install -q --no-compile -r .venv/$*.txt
 	@touch $@
 
 .venv/.package: $(SOURCES) pyproject.toml README.md LICENSE .venv/.build | system

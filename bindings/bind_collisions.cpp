@@ -227,6 +227,9 @@ void bind_world(py::class_<Collisions>& c) {
            "Attaches an object of up to 4 capsules to the tip, in the tip's frame, in place of the one that the arm "
            "carries.")
       .def("detach", &Collisions::detach, "Lets go of the object.")
+      .def("__copy__", [](const Collisions& s) { return s; })
+      .def(
+          "__deepcopy__", [](const Collisions& s, const py::dict&) { return s; }, py::arg("memo"))
       .def(
           "distance",
           [](const Collisions& s, const ArrayLike& q) {

@@ -1,5 +1,5 @@
-#include <cmath>
 #include <pybind11/native_enum.h>
+#include <cmath>
 
 #include "servo_options.hpp"
 #include "values.hpp"
@@ -23,9 +23,11 @@ std::optional<double> cycle_argument(const Servo& servo, const std::optional<dou
   constexpr double kRounding = 1e-9;
   if (!dt || *dt == nominal) return dt;
   if (servo.options().collisions && !(std::abs(*dt - nominal) <= kRounding * nominal)) {
-    throw Error("dt = " + text_of(*dt) + " s: a servo with collisions has cycles of its dt, " + text_of(nominal) + " s");
+    throw Error("dt = " + text_of(*dt) + " s: a servo with collisions has cycles of its dt, " + text_of(nominal) +
+                " s");
   }
-  if (*dt >= kShortestCycle * nominal * (1.0 - kRounding) && *dt <= kLongestCycle * nominal * (1.0 + kRounding)) return dt;
+  if (*dt >= kShortestCycle * nominal * (1.0 - kRounding) && *dt <= kLongestCycle * nominal * (1.0 + kRounding))
+    return dt;
   throw Error("dt = " + text_of(*dt) + " s must be from " + text_of(kShortestCycle * nominal) + " to " +
               text_of(kLongestCycle * nominal) + " s, a tenth to 20 times the servo's dt");
 }

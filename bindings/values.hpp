@@ -27,6 +27,8 @@ bool equal(const T& one, const T& other) {
     return equal(one.axis, other.axis) && one.angle == other.angle;
   } else if constexpr (std::is_same_v<T, Inertia>) {
     return same(one, other);
+  } else if constexpr (std::is_same_v<T, Collisions>) {
+    return one.model() == other.model();  // copies share the scene
   } else if constexpr (requires { Fields<T>::all; }) {
     return std::apply(
         [&](const auto&... entry) {

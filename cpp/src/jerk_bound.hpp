@@ -17,7 +17,7 @@ struct JerkState {
   double room;              // to the upper position limit [velocities × cycles]
   double slack;             // of the room: a smaller excess is rounding
   double velocity, acceleration, braking, jerk, recovery;
-  double settling;  // the slope limit of a way to a steady velocity
+  double settling;       // the slope limit of a way to a steady velocity
   double last = 1.0;     // the time of the last cycle [cycles]
   double longest = 0.0;  // that of the longest cycle to come, where cycles are not even; 0: all cycles are even
 };

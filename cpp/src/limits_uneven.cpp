@@ -78,13 +78,14 @@ LimitTracker::Window LimitTracker::uneven_window(int i, bool& broken) noexcept {
   const double above = room_above(i), below = room_below(i);
   const double highest = above < kInfinity ? towards(i, above) : kInfinity;
   const double lowest = below < kInfinity ? -towards(i, below) : -kInfinity;
-  Window window{v >= 0.0 ? detail::slowest_after(v, a * part, b * part) : -detail::fastest_after(-v, a * part, b * part),
-                v > 0.0 ? detail::fastest_after(v, a * part, b * part) : -detail::slowest_after(-v, a * part, b * part),
-                kind, kind};
+  Window window{
+      v >= 0.0 ? detail::slowest_after(v, a * part, b * part) : -detail::fastest_after(-v, a * part, b * part),
+      v > 0.0 ? detail::fastest_after(v, a * part, b * part) : -detail::slowest_after(-v, a * part, b * part), kind,
+      kind};
   const double slack = detail::kLimitTolerance * (a + (1.0 + std::abs(q_[i])) * per_dt_);
   broken = std::abs(v) > limit || highest < window.lower - slack || lowest > window.upper + slack;
   if ((changing_ >> i & 1u) != 0) {
-    const double more = b * std::max(1.0, dt_ * per_dt_);  // what a cycle of dt takes
+    const double more = b * std::max(1.0, dt_ * per_dt_);            // what a cycle of dt takes
     const double brake = detail::braking(b), way = v * std::abs(v);  // Φ(v) ≤ room, whatever the coming cycle's time
     if (way <= brake * above && -way <= brake * below) changing_ &= ~(1u << i);
     if (highest < window.lower) window.lower = std::max(highest, v - more);

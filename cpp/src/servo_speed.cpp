@@ -50,7 +50,8 @@ void move(const Chain& chain, const JointVector& q, const JointVector& qdot, con
   out.count = 0;
   Link link;
   detail::FrameColumns frame = detail::walk(chain, q, [&](int i, const detail::FrameColumns& f) {
-    const Coupling coupling = chain.has_mimics() ? chain.couplings()[static_cast<std::size_t>(i)] : Coupling{i, 1.0, 0.0};
+    const Coupling coupling = chain.has_mimics() ? chain.couplings()[static_cast<std::size_t>(i)]
+                                                 : Coupling{i, 1.0, 0.0};
     const Vector3d axis = f.z.head<3>(), along = coupling.multiplier * qdot[coupling.joint] * axis;
     link.move_to(f.p.head<3>());
     if (chain.constants()[static_cast<std::size_t>(i)].prismatic) {
@@ -214,7 +215,8 @@ JointVector Servo::slowest(JointVector qdot, const VelocityBounds& bounds) const
     }
     Vector3d velocity = points.velocity[worst];
     for (int i = 0; i < n; ++i) {
-      move(chain_, tracker_.q(), JointVector(JointVector::Unit(n, i)), tool_.translation(), options_.speed_points, points);
+      move(chain_, tracker_.q(), JointVector(JointVector::Unit(n, i)), tool_.translation(), options_.speed_points,
+           points);
       column[static_cast<std::size_t>(i)] = points.velocity[worst];
     }
     for (int i = 0; i < n; ++i) {

@@ -191,12 +191,15 @@ Chain read_chain(const std::string& xml, std::string base, std::string tip, cons
 
 }  // namespace
 
+Chain detail::with_urdf(Chain chain, std::string text) {
+  chain.urdf_ = text.empty() ? nullptr : std::make_shared<const std::string>(std::move(text));
+  return chain;
+}
+
 Chain Chain::from_urdf(const std::string& source, const std::string& base, const std::string& tip,
                        const std::vector<double>& acceleration) {
   return detail::xml::with_label(source, [&](const std::string& text) {
-    Chain chain = read_chain(text, base, tip, acceleration);
-    chain.urdf_ = std::make_shared<const std::string>(text);
-    return chain;
+    return detail::with_urdf(read_chain(text, base, tip, acceleration), text);
   });
 }
 

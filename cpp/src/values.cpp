@@ -11,17 +11,19 @@ namespace {
 constexpr std::string_view kMark = "sigK";
 constexpr std::size_t kHeader = 4 + 4 + 8 + 8;  // mark, version, fingerprint, checksum
 
-// What is written of a T. A chain is made again of its parts.
+// What is written of a chain, which is made again of these parts. Chains are compared without the URDF, which matters
+// to the shapes of collisions alone.
 struct ChainParts {
   std::string base;
   std::vector<Segment> segments;
+  std::string urdf;
 };
 
 }  // namespace
 
 template <>
 struct Members<ChainParts> {
-  static constexpr std::tuple all{&ChainParts::base, &ChainParts::segments};
+  static constexpr std::tuple all{&ChainParts::base, &ChainParts::segments, &ChainParts::urdf};
 };
 
 namespace {
@@ -30,7 +32,13 @@ template <typename T>
 const T& parts_of(const T& value) {
   return value;
 }
-ChainParts parts_of(const Chain& chain) { return {chain.base(), chain.segments()}; }
+ChainParts parts_of(const Chain& chain) { return {chain.base(), chain.segments(), {}}; }
+
+template <typename T>
+const T& written_of(const T& value) {
+  return value;
+}
+ChainParts written_of(const Chain& chain) { return {chain.base(), chain.segments(), chain.urdf()}; }
 
 template <typename T>
 std::string with_header(const T& value) {
@@ -84,7 +92,7 @@ int joints_of(const TargetStream&) { return 0; }
 
 template <typename Value>
 std::string save(const Value& value) {
-  return detail::with_header(detail::parts_of(value));
+  return detail::with_header(detail::written_of(value));
 }
 
 template <typename Value>
@@ -92,7 +100,7 @@ Value load(std::string_view bytes) {
   if constexpr (std::is_same_v<Value, Chain>) {
     detail::ChainParts parts;
     detail::read(bytes, -1, parts);
-    return Chain(std::move(parts.base), std::move(parts.segments));
+    return detail::with_urdf(Chain(std::move(parts.base), std::move(parts.segments)), std::move(parts.urdf));
   } else {
     Value value;
     detail::read(bytes, -1, value);

@@ -21,6 +21,7 @@ class MarkReader {
   void line(std::string text) {
     text.erase(0, text.find_first_not_of(' '));
     if (text.starts_with("//")) {
+      text.erase(0, text.find_first_not_of("/ "));  // words that a line break parts stay together
       if (declaration_.empty()) comment_ += lower(text) + " ";
       return;
     }

@@ -55,7 +55,7 @@ TEST_CASE("a tool moves the tip, and adds its inertia to the last link") {
     Inertia at_flange = inertia;
     at_flange.center_of_mass = tool * inertia.center_of_mass;
     at_flange.tensor = tool.linear() * inertia.tensor * tool.linear().transpose();
-    Dynamics with_tool(held), with_payload(arm, Eigen::Vector3d(0.0, 0.0, -9.81), at_flange);
+    Dynamics with_tool(held), with_payload(arm, Eigen::Vector3d(0.0, 0.0, -9.80665), at_flange);
     CHECK(largest(with_tool.mass_matrix(q) - with_payload.mass_matrix(q)) < 1e-12);
     CHECK(largest(with_tool.gravity(q) - with_payload.gravity(q)) < 1e-11);
   }

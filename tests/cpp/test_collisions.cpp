@@ -293,7 +293,7 @@ TEST_CASE("towards a target that rests the arm comes to rest, and arrives where 
 }
 
 TEST_CASE("a start inside the margin leads outwards, and no pair comes nearer than it was") {
-  const Chain& chain = test::arms().at("franka_panda");
+  const Chain& chain = test::arms().at("kuka_lbr_iiwa_14_r820");
   int seen = 0;
   for (unsigned seed = 0; seed < 40 && seen < 12; ++seed) {
     test::Random random(300 + seed);

@@ -169,7 +169,7 @@ TEST_CASE("the heavy rail moves where the arm cannot: to a target beyond the arm
     Pose target = servo.tip();
     target.translation().x() += 1.5;
     ServoStep step;
-    for (int i = 0; i < 5000; ++i) {
+    for (int i = 0; i < 8000; ++i) {
       step = servo.update(target);
       for (int k = 0; k < 7; ++k) {
         REQUIRE(std::abs(step.qdot[k]) <= arm.limits().velocity[k] * (1.0 + 1e-9));

@@ -287,7 +287,7 @@ TEST_CASE("to KDL, segment for segment") {
       CHECK(a.joint_name == b.joint_name);
       CHECK(a.link_name == b.link_name);
       CHECK(largest(a.origin.matrix() - b.origin.matrix()) < 1e-15);
-      CHECK((a.type == JointType::Fixed || (a.axis - b.axis).norm() < 1e-15));
+      CHECK((a.type == JointType::Fixed || (a.axis - b.axis).norm() < 2e-15));
       CHECK(a.inertia.has_value() == b.inertia.has_value());
       if (a.inertia) CHECK(largest(a.inertia->tensor - b.inertia->tensor) < kTolerance);
     }

@@ -133,7 +133,7 @@ TEST_CASE("dynamics are those of all joints, projected by virtual work") {
         frame = frame * s.origin;
         if (s.type == JointType::Prismatic) frame.translate(Eigen::Vector3d(positions[i++] * s.axis));
         if (s.type == JointType::Revolute) frame.rotate(rotation_exp(positions[i++] * s.axis));
-        sum += s.inertia->mass * 9.81 * (frame * s.inertia->center_of_mass).z();
+        sum += s.inertia->mass * 9.80665 * (frame * s.inertia->center_of_mass).z();
       }
       return sum;
     };

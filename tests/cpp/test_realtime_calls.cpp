@@ -123,6 +123,11 @@ void add_servo(Calls& calls) {
                 }));
   auto old = servo();
   for (int k = 0; k < 50; ++k) old->update(r.near);
+  calls.emplace("servo.hpp set_tool", servo_work([&r](Servo& s, int k) {
+                  Pose tool = Pose::Identity();
+                  tool.translation().z() = 0.05 * (k / 40 % 3);
+                  use(s.set_tool(tool) ? s.update(r.near).qdot[0] : 0.0);
+                }));
   calls.emplace("servo.hpp continue_from", servo_work([old](Servo& s, int) { s.continue_from(*old); }));
 }
 
@@ -136,6 +141,13 @@ void add_limits(Calls& calls) {
   calls.emplace("limits.hpp heading", [=] { use(tracker->heading().upper[0]); });
   calls.emplace("limits.hpp arrival", [=] { use(tracker->arrival(fast, 10.0)); });
   calls.emplace("limits.hpp approach", [=] { use(tracker->approach(fast)[0]); });
+  calls.emplace("limits.hpp set_cycle", [=] {
+    auto uneven = *tracker;
+    for (int k = 0; k < 3000; ++k) {
+      JointVector qdot = k % 700 < 500 ? fast : JointVector(-2.0 * fast);
+      use(uneven.set_cycle(k % 5 == 0 ? 2.5e-3 : 1e-3) && uneven.advance(qdot) ? 1.0 : 0.0);
+    }
+  });
   calls.emplace("limits.hpp advance", [=] {
     for (int k = 0; k < 3000; ++k) {
       JointVector qdot = k % 700 < 500 ? fast : JointVector(-2.0 * fast);
@@ -269,6 +281,7 @@ void add_costs(Calls& calls) {
     Eigen::Vector3d gradient;
     use(field->distance(Eigen::Vector3d(0.1, 0.0, 0.2), gradient));
   });
+  calls.emplace("collision_costs.hpp min_distance", [=, &r] { use(min_distance(*spheres, *field, r.q)); });
   auto state = std::make_shared<SphereState>();
   spheres->update(r.q, *state);
   const int last = spheres->size() - 1;
@@ -301,6 +314,32 @@ void add_streams(Calls& calls) {
       }
     });
   }
+  const std::array<Pose, 8> actions{r.near, r.near, r.far, r.near, r.near, r.far, r.near, r.near};
+  std::array<Twist, 8> twists;
+  twists.fill(r.twist);
+  for (const char* name : {"action_chunks.hpp push", "action_chunks.hpp push_twists", "action_chunks.hpp at"}) {
+    auto chunks = std::make_shared<ActionChunks>();
+    calls.emplace(name, [=] {
+      for (int k = 0; k < 3000; ++k) {
+        if (k % 300 == 0) use(static_cast<double>(chunks->push(1e-3 * k - 0.1, actions)));
+        if (k % 700 == 699) use(static_cast<double>(chunks->push_twists(1e-3 * k - 0.1, twists)));
+        use(chunks->at(1e-3 * k).twist[0]);
+      }
+    });
+  }
+  auto batch = std::make_shared<ServoBatch>(r.chain, JParse{}, ServoOptions{}, 3);
+  std::vector<double> starts(r.q.data(), r.q.data() + r.q.size()), targets(3 * 16);
+  batch->reset(starts);
+  for (int k = 0; k < 3; ++k) {
+    const Eigen::Matrix<double, 4, 4, Eigen::RowMajor> target = r.near.matrix();
+    std::copy(target.data(), target.data() + 16, targets.begin() + 16 * k);
+  }
+  calls.emplace("servo_batch.hpp update", [=] {
+    for (int k = 0; k < 200; ++k) use(batch->update(targets) ? 1.0 : 0.0);
+  });
+  auto collisions = std::make_shared<Collisions>(r.chain,
+                                                 std::vector<Obstacle>{Obstacle::sphere({0.8, 0.0, 0.4}, 0.1)});
+  calls.emplace("collisions.hpp nearest", [=, &r] { use(collisions->nearest(r.q).distance); });
   ConstrainedIkOptions options;
   options.gamma = 1.0;
   std::vector<std::shared_ptr<ConstrainedIk>> all{std::make_shared<ConstrainedIk>(r.chain),

@@ -27,7 +27,8 @@ class ClockWatch {
       : limits_(limits), q_(q), v_(JointVector::Zero(q.size())), a_(v_), last_(dt) {
     for (double& a : limits_.acceleration) a = a < kInfinity ? a : assumed;
     if (limits_.deceleration.size() == 0) limits_.deceleration = limits_.acceleration;
-    limits_.deceleration = (limits_.deceleration.array() < kInfinity).select(limits_.deceleration, limits_.acceleration);
+    limits_.deceleration = (limits_.deceleration.array() < kInfinity)
+                               .select(limits_.deceleration, limits_.acceleration);
   }
 
   void step(const JointVector& q, const JointVector& qdot, double h) {

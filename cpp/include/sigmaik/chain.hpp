@@ -15,8 +15,13 @@
 
 namespace sigmaik {
 
+class Chain;
+
 namespace detail {
 inline const std::string kNoText;
+
+// A chain that was read from this text, or was made again of the parts of such a chain.
+Chain with_urdf(Chain chain, std::string text);
 }  // namespace detail
 
 /// Kind of a joint. A continuous joint turns without position limits; its positions are the same modulo 2π.
@@ -194,8 +199,10 @@ class Chain {
     std::array<JointConstants, kMaxJoints> constants;
     Pose tool = Pose::Identity();
   };
+  friend Chain detail::with_urdf(Chain chain, std::string text);
+
   std::shared_ptr<const Model> model_;
-  std::shared_ptr<const std::string> urdf_;
+  std::shared_ptr<const std::string> urdf_;  // null: none
 };
 
 SIGMAIK_SAME_LAYOUT(Chain, Inertia, Segment, JointLimits, JointConstants, Coupling);

@@ -63,9 +63,9 @@
 ///     most the longest cycle times the rise s²/2J.
 /// Without a jerk limit a joint that brakes with another limit has B in place of A in Φ. With a jerk limit such a joint
 /// changes its velocity by min(A, B) h at most where it chooses; its stop has B.
-/// At the change from even cycles, a joint may just be braking towards a position limit by the sum of samples, for which
-/// shorter cycles come too late. Such a joint keeps its position limit: until the joint is inside the new bounds, it
-/// brakes by up to A max(h_k, h_{k−1}), with a jerk limit by what a cycle of dt takes.
+/// At the change from even cycles, a joint may just be braking towards a position limit by the sum of samples, for
+/// which shorter cycles come too late. Such a joint keeps its position limit: until the joint is inside the new bounds,
+/// it brakes by up to A max(h_k, h_{k−1}), with a jerk limit by what a cycle of dt takes.
 ///
 /// Where a limit is broken already (reset() outside it, or too fast to stop before it), acceleration and jerk are held
 /// first, because the motors can do no more, then velocity, then position: each of these comes back as fast as the
@@ -302,12 +302,12 @@ class LimitTracker {
   bool uneven_ = false;         // since reset() a cycle had another time than dt
   std::uint32_t changing_ = 0;  // bit i: joint i still follows bounds of even cycles, see limits.hpp
   int n_ = 0;
-  Numbers lower_, upper_;  // [rad or m]
-  Numbers velocity_;       // V
-  Numbers acceleration_;   // A dt
-  Numbers braking_;        // B dt
-  Numbers jerk_;           // J dt²
-  Numbers recovery_;       // [rad/s or m/s], infinite without a velocity limit
+  Numbers lower_, upper_;                                 // [rad or m]
+  Numbers velocity_;                                      // V
+  Numbers acceleration_;                                  // A dt
+  Numbers braking_;                                       // B dt
+  Numbers jerk_;                                          // J dt²
+  Numbers recovery_;                                      // [rad/s or m/s], infinite without a velocity limit
   Numbers most_acceleration_, most_braking_, most_jerk_;  // A, B and J, in s
   double settling_time_ = 0.0;
   std::uint32_t with_jerk_ = 0;  // bit i: joint i has a jerk limit
