@@ -10,7 +10,7 @@ import os
 import pathlib
 import sigmaik.planning.status
 import typing
-__all__: list[str] = ['ActionChunks', 'ActionStatus', 'ActionTarget', 'AdaptiveDampedLeastSquares', 'AnalyticBranch', 'AnalyticIk', 'ArgumentError', 'ArmSpheres', 'CartError', 'CartMeasures', 'CartMotion', 'CartRegion', 'Chain', 'ChunkCounts', 'ChunkStatus', 'Clearance', 'ComputedTorque', 'ComputedTorqueStep', 'ConstrainedIk', 'ConstrainedIkStep', 'Crossing', 'DEFAULT_SCALE', 'DampedLeastSquares', 'DistanceField', 'Dynamics', 'Error', 'GuideState', 'Inertia', 'JParse', 'JacobianProjection', 'JacobianSafety', 'JacobianSafetyProjection', 'JointCost', 'JointLimits', 'LeastSquaresSolution', 'LoopCommand', 'LoopFault', 'LoopFaultKind', 'LoopState', 'LoopStatistics', 'LoopToken', 'Method', 'ModelWarning', 'PlaneCartMotion', 'Playback', 'PositionIk', 'PositionIkBranch', 'PositionIkResult', 'PositionIkStatus', 'PseudoInverse', 'SampleCounts', 'SampleStatus', 'Segment', 'SelectivelyDampedLeastSquares', 'Servo', 'ServoBatch', 'ServoLoop', 'ServoStep', 'SingularSets', 'Solution', 'Spectrum', 'Status', 'StreamStatus', 'Target', 'TargetStream', 'TimeOptimal', 'TimeOptimalResult', 'Trajectory', 'VelocitySolver', 'admissible_guess', 'cart_descent', 'cart_motion', 'cart_motion_by_descent', 'clearance', 'collision_cost', 'draw_from_prior', 'evaluate_cart_motion', 'evaluate_cart_motion_plane', 'evaluate_index', 'forbidden_intervals', 'geometry_aware_cost', 'index_of_jacobian', 'joint_limit_cost', 'known_singular_sets', 'least_squares', 'load_singular_sets', 'log_manipulability_cost', 'manipulability_cost', 'min_distance', 'plan_gradient', 'plan_stochastic', 'plane_cart_motion', 'planner_options', 'play', 'pose_error', 'potential_cost', 'reference_scale', 'rotation_exp', 'rotation_log', 'rules', 'scaled_cost', 'self_collision_cost', 'self_collision_pairs', 'singular_sets_of', 'solve_batch', 'spline_velocities', 'sum_of_costs', 'taut_string']
+__all__: list[str] = ['ActionChunks', 'ActionStatus', 'ActionTarget', 'AdaptiveDampedLeastSquares', 'AnalyticBranch', 'AnalyticIk', 'ArgumentError', 'ArmSpheres', 'Capsule', 'CartError', 'CartMeasures', 'CartMotion', 'CartRegion', 'Chain', 'ChunkCounts', 'ChunkStatus', 'Clearance', 'Collisions', 'ComputedTorque', 'ComputedTorqueStep', 'ConstrainedIk', 'ConstrainedIkStep', 'Crossing', 'DEFAULT_SCALE', 'DampedLeastSquares', 'DistanceField', 'Dynamics', 'Error', 'GuideState', 'Inertia', 'JParse', 'JacobianProjection', 'JacobianSafety', 'JacobianSafetyProjection', 'JointCost', 'JointLimits', 'LeastSquaresSolution', 'LinkCapsule', 'LoopCommand', 'LoopFault', 'LoopFaultKind', 'LoopState', 'LoopStatistics', 'LoopToken', 'Method', 'ModelWarning', 'Obstacle', 'PlaneCartMotion', 'Playback', 'PositionIk', 'PositionIkBranch', 'PositionIkResult', 'PositionIkStatus', 'PseudoInverse', 'SampleCounts', 'SampleStatus', 'Segment', 'SelectivelyDampedLeastSquares', 'Servo', 'ServoBatch', 'ServoLoop', 'ServoStep', 'SingularSets', 'Solution', 'Spectrum', 'Status', 'StreamStatus', 'Target', 'TargetStream', 'TimeOptimal', 'TimeOptimalResult', 'Trajectory', 'VelocitySolver', 'admissible_guess', 'cart_descent', 'cart_motion', 'cart_motion_by_descent', 'clearance', 'collision_cost', 'draw_from_prior', 'evaluate_cart_motion', 'evaluate_cart_motion_plane', 'evaluate_index', 'forbidden_intervals', 'geometry_aware_cost', 'index_of_jacobian', 'joint_limit_cost', 'known_singular_sets', 'least_squares', 'load_singular_sets', 'log_manipulability_cost', 'manipulability_cost', 'min_distance', 'nearest_turn', 'plan_gradient', 'plan_stochastic', 'plane_cart_motion', 'planner_options', 'play', 'pose_error', 'potential_cost', 'reference_scale', 'rotation_exp', 'rotation_log', 'rules', 'scaled_cost', 'self_collision_cost', 'self_collision_pairs', 'singular_sets_of', 'solve_batch', 'spline_velocities', 'sum_of_costs', 'taut_string']
 DEFAULT_SCALE: float = 6.0
 __version__: str
 
@@ -258,7 +258,7 @@ class Chain:
         A continuous joint with a position limit (a cable) becomes a revolute joint. deceleration: of a joint that
         becomes slower; infinite: as the acceleration.
         """
-    def with_tool(self, pose: numpy.typing.ArrayLike, inertia: Inertia | None = None) -> Chain:
+    def with_tool(self, pose: typing.Any, inertia: Inertia | None = None) -> Chain:
         """
         The same arm with a tool, whose frame is the new tip.
 
@@ -876,6 +876,10 @@ class Collisions:
     or more joints between them are checked, but for those that are near at nine of ten configurations. All servos
     with the same Collisions share its obstacles and its carried object.
     """
+    def __copy__(self) -> Collisions:
+        ...
+    def __deepcopy__(self, memo: dict) -> Collisions:
+        ...
     def __init__(self, chain: Chain, obstacles: typing.Any = None, self_collision: bool = True, margin: typing.SupportsFloat | typing.SupportsIndex = 0.01, *, source: typing.Any = None, srdf: typing.Any = None, radius: typing.SupportsFloat | typing.SupportsIndex = 0.05, capsules: typing.SupportsInt | typing.SupportsIndex | None = None, ignore: collections.abc.Sequence[tuple[str, str]] = [], arm: collections.abc.Sequence[LinkCapsule] | None = None) -> None:
         """
         obstacles: up to 32 of Obstacle, or of the shapes Box, Sphere, Cylinder of sigmaik.planning, or an Obstacles of
@@ -1078,7 +1082,12 @@ class Servo:
     It integrates its own command (q ← q + q̇ dt) and needs no measured positions (`measure`). Every command holds
     the chain's limits and leaves room to go on holding them; a start outside them comes back.
     """
-    def __init__(self, chain: Chain, method: Method | str | None = None, dt: typing.SupportsFloat | typing.SupportsIndex = 0.001, *, gain_linear: typing.SupportsFloat | typing.SupportsIndex = 10.0, gain_angular: typing.SupportsFloat | typing.SupportsIndex = 10.0, max_linear_error: typing.SupportsFloat | typing.SupportsIndex | None = None, max_angular_error: typing.SupportsFloat | typing.SupportsIndex = 1.0, soft_start: typing.SupportsFloat | typing.SupportsIndex = 0.1, posture: numpy.typing.ArrayLike | None = None, posture_gain: typing.SupportsFloat | typing.SupportsIndex = 0.0, posture_max_speed: typing.SupportsFloat | typing.SupportsIndex = ..., avoid: typing.Literal['manipulability', 'potential'] | None = None, avoid_gain: typing.SupportsFloat | typing.SupportsIndex = 1.0, avoid_max_speed: typing.SupportsFloat | typing.SupportsIndex = 0.5, eta1: typing.SupportsFloat | typing.SupportsIndex = 0.0, eta2: typing.SupportsFloat | typing.SupportsIndex = 10.0, position_limits: bool = True, velocity_limits: bool = True, acceleration_limits: bool = True, jerk_limits: bool = True, assumed_acceleration: typing.SupportsFloat | typing.SupportsIndex = 10.0, recovery_speed: typing.SupportsFloat | typing.SupportsIndex = 0.1, on_limit: typing.Literal['redistribute', 'scale'] = 'redistribute', exact: numpy.typing.ArrayLike | None = (0, 0, 0, 0, 0, 0), length_scale: typing.SupportsFloat | typing.SupportsIndex | None = None, joint_weights: numpy.typing.ArrayLike | None = None, guided: bool = False, mask: numpy.typing.ArrayLike | None = (1, 1, 1, 1, 1, 1), frame: typing.Literal['base', 'tool'] = 'base') -> None:
+    __hash__: typing.ClassVar[None] = None  # type: ignore[assignment]
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> tuple[typing.Any, ...]:
+        ...
+    def __init__(self, chain: Chain, method: Method | str | None = None, dt: typing.SupportsFloat | typing.SupportsIndex = 0.001, *, gain_linear: typing.SupportsFloat | typing.SupportsIndex = 10.0, gain_angular: typing.SupportsFloat | typing.SupportsIndex = 10.0, max_linear_error: typing.SupportsFloat | typing.SupportsIndex | None = None, max_angular_error: typing.SupportsFloat | typing.SupportsIndex = 1.0, soft_start: typing.SupportsFloat | typing.SupportsIndex = 0.1, posture: numpy.typing.ArrayLike | None = None, posture_gain: typing.SupportsFloat | typing.SupportsIndex = 0.0, posture_max_speed: typing.SupportsFloat | typing.SupportsIndex = ..., avoid: typing.Literal['manipulability', 'potential'] | None = None, avoid_gain: typing.SupportsFloat | typing.SupportsIndex = 1.0, avoid_max_speed: typing.SupportsFloat | typing.SupportsIndex = 0.5, eta1: typing.SupportsFloat | typing.SupportsIndex = 0.0, eta2: typing.SupportsFloat | typing.SupportsIndex = 10.0, position_limits: bool = True, velocity_limits: bool = True, acceleration_limits: bool = True, jerk_limits: bool = True, assumed_acceleration: typing.SupportsFloat | typing.SupportsIndex = 10.0, recovery_speed: typing.SupportsFloat | typing.SupportsIndex = 0.1, on_limit: typing.Literal['redistribute', 'scale'] = 'redistribute', exact: numpy.typing.ArrayLike | None = (0, 0, 0, 0, 0, 0), max_tool_speed: typing.SupportsFloat | typing.SupportsIndex = ..., speed_points: numpy.typing.ArrayLike | None = None, length_scale: typing.SupportsFloat | typing.SupportsIndex | None = None, joint_weights: numpy.typing.ArrayLike | None = None, guided: bool = False, collisions: Collisions | None = None, strict: bool = False, mask: numpy.typing.ArrayLike | None = (1, 1, 1, 1, 1, 1), frame: typing.Literal['base', 'tool'] = 'base') -> None:
         """
         Warns (ModelWarning) of velocity and acceleration limits that joints lack.
 
@@ -1123,14 +1132,16 @@ class Servo:
             none.
         length_scale: [m] > 0: 1 rad/s weighs as much as length_scale m/s, as for VelocitySolver. None:
             chain.characteristic_length.
-        joint_weights: (n,) > 0, how much each joint's motion counts where there are more joints than rows: a
-            rail with 1e4 moves only where the other joints cannot do the motion. Only ratios matter. None:
-            all 1.
+        joint_weights: (n,) > 0, how much each joint's motion counts where there are more joints than rows:
+            a rail with 1e4 moves only where the other joints cannot do the motion. Only ratios matter.
+            None: all 1.
         guided: whether the servo takes another way to a pose target that rests where its own way does not
             arrive: through another configuration of the arm, if need be away from the tool's straight line.
             `step.guide` says so. Arrives at each target that PositionIk finds.
         collisions: what the arm must not touch: no command brings a pair of bodies nearer than the margin.
             None: nothing is checked.
+        strict: whether `update` raises Error for a target that is no pose, in place of BAD_INPUT and a
+            stop.
         mask: (6,) truth values: the rows (vx, vy, vz, ωx, ωy, ωz) that matter; None: all.
         frame: the axes of these rows, the base's or the tool's.
         """
@@ -1171,14 +1182,14 @@ class Servo:
         To tell a running servo where the arm is, call `measure`.
         Warns (ModelWarning) of a joint that starts more than 1 rad or 1 m outside its limits.
         """
-    def set_tool(self, tool: numpy.typing.ArrayLike) -> None:
+    def set_tool(self, tool: typing.Any) -> None:
         """
         Puts a tool on the tip from the next cycle on: targets, twists and poses are then those of its frame.
 
         tool: (4, 4) in the chain's tip; the identity takes the tool off. q̇ does not jump: the command is faded in
         from the last velocity over soft_start, inside all limits. For Dynamics use chain.with_tool(pose, inertia).
         """
-    def update(self, target: typing.Any, feedforward: numpy.typing.ArrayLike | None = None) -> ServoStep:
+    def update(self, target: typing.Any, feedforward: numpy.typing.ArrayLike | None = None, dt: typing.SupportsFloat | typing.SupportsIndex | None = None) -> ServoStep:
         """
         One cycle towards a pose (4, 4) of the tip in the base.
 
@@ -1187,7 +1198,9 @@ class Servo:
         dt: [s] the time since the last call on the robot's clock, from a tenth to 20 times the servo's dt; None: the
             servo's dt. After a lost packet, or in a loop that is not even, the limits then hold against the clock: the
             position command advances by q̇ dt, and q̇ changes by no more than the acceleration limit times dt.
-        Raises Error, and holds, where the target is not a pose, or dt is outside its range.
+        Raises Error, and holds, where dt is outside its range.
+        A matrix that is no pose (a rotation off by more than rounding, another last row) stops the arm: BAD_INPUT. With
+            strict=True of the servo it raises Error, as arguments of a wrong shape or with NaN do in any case.
         """
     def update_twist(self, twist: numpy.typing.ArrayLike, frame: str = 'base', point: numpy.typing.ArrayLike | None = None, dt: typing.SupportsFloat | typing.SupportsIndex | None = None) -> ServoStep:
         """
@@ -1253,6 +1266,11 @@ class Servo:
         """
         [s], after which a motion towards a target that rests is called not settling.
         """
+    @property
+    def tool(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (4, 4) of set_tool(), in the chain's tip.
+        """
 
 # ---- Servo batch ------------------------------------------------------------------------------------------------------
 class ServoBatch:
@@ -1268,7 +1286,7 @@ class ServoBatch:
     achieved_twist and pose are views on arrays that the batch owns: each cycle overwrites them, `.copy()` keeps them, and
     what is written into them moves no servo. numpy.from_dlpack, torch.from_dlpack and others take them without a copy.
     """
-    def __init__(self, chain: Chain, method: Method | str | None = None, dt: typing.SupportsFloat | typing.SupportsIndex = 0.001, size: typing.SupportsInt | typing.SupportsIndex = 1, threads: typing.SupportsInt | typing.SupportsIndex = 1, *, gain_linear: typing.SupportsFloat | typing.SupportsIndex = 10.0, gain_angular: typing.SupportsFloat | typing.SupportsIndex = 10.0, max_linear_error: typing.SupportsFloat | typing.SupportsIndex | None = None, max_angular_error: typing.SupportsFloat | typing.SupportsIndex = 1.0, soft_start: typing.SupportsFloat | typing.SupportsIndex = 0.1, posture: numpy.typing.ArrayLike | None = None, posture_gain: typing.SupportsFloat | typing.SupportsIndex = 0.0, posture_max_speed: typing.SupportsFloat | typing.SupportsIndex = ..., avoid: typing.Literal['manipulability', 'potential'] | None = None, avoid_gain: typing.SupportsFloat | typing.SupportsIndex = 1.0, avoid_max_speed: typing.SupportsFloat | typing.SupportsIndex = 0.5, eta1: typing.SupportsFloat | typing.SupportsIndex = 0.0, eta2: typing.SupportsFloat | typing.SupportsIndex = 10.0, position_limits: bool = True, velocity_limits: bool = True, acceleration_limits: bool = True, jerk_limits: bool = True, assumed_acceleration: typing.SupportsFloat | typing.SupportsIndex = 10.0, recovery_speed: typing.SupportsFloat | typing.SupportsIndex = 0.1, on_limit: typing.Literal['redistribute', 'scale'] = 'redistribute', exact: numpy.typing.ArrayLike | None = (0, 0, 0, 0, 0, 0), length_scale: typing.SupportsFloat | typing.SupportsIndex | None = None, guided: bool = False, mask: numpy.typing.ArrayLike | None = (1, 1, 1, 1, 1, 1), frame: typing.Literal['base', 'tool'] = 'base') -> None:
+    def __init__(self, chain: Chain, method: Method | str | None = None, dt: typing.SupportsFloat | typing.SupportsIndex = 0.001, size: typing.SupportsInt | typing.SupportsIndex = 1, threads: typing.SupportsInt | typing.SupportsIndex = 1, *, gain_linear: typing.SupportsFloat | typing.SupportsIndex = 10.0, gain_angular: typing.SupportsFloat | typing.SupportsIndex = 10.0, max_linear_error: typing.SupportsFloat | typing.SupportsIndex | None = None, max_angular_error: typing.SupportsFloat | typing.SupportsIndex = 1.0, soft_start: typing.SupportsFloat | typing.SupportsIndex = 0.1, posture: numpy.typing.ArrayLike | None = None, posture_gain: typing.SupportsFloat | typing.SupportsIndex = 0.0, posture_max_speed: typing.SupportsFloat | typing.SupportsIndex = ..., avoid: typing.Literal['manipulability', 'potential'] | None = None, avoid_gain: typing.SupportsFloat | typing.SupportsIndex = 1.0, avoid_max_speed: typing.SupportsFloat | typing.SupportsIndex = 0.5, eta1: typing.SupportsFloat | typing.SupportsIndex = 0.0, eta2: typing.SupportsFloat | typing.SupportsIndex = 10.0, position_limits: bool = True, velocity_limits: bool = True, acceleration_limits: bool = True, jerk_limits: bool = True, assumed_acceleration: typing.SupportsFloat | typing.SupportsIndex = 10.0, recovery_speed: typing.SupportsFloat | typing.SupportsIndex = 0.1, on_limit: typing.Literal['redistribute', 'scale'] = 'redistribute', exact: numpy.typing.ArrayLike | None = (0, 0, 0, 0, 0, 0), max_tool_speed: typing.SupportsFloat | typing.SupportsIndex = ..., speed_points: numpy.typing.ArrayLike | None = None, length_scale: typing.SupportsFloat | typing.SupportsIndex | None = None, joint_weights: numpy.typing.ArrayLike | None = None, guided: bool = False, collisions: Collisions | None = None, strict: bool = False, mask: numpy.typing.ArrayLike | None = (1, 1, 1, 1, 1, 1), frame: typing.Literal['base', 'tool'] = 'base') -> None:
         """
         Warns (ModelWarning) of velocity and acceleration limits that joints lack.
 
@@ -1309,11 +1327,23 @@ class ServoBatch:
             the tool.
         exact: (6,) truth values: the rows (vx, vy, vz, ωx, ωy, ωz) that come before the others in every
             cycle.
+        max_tool_speed: [m/s] > 0: no checked point of the arm (the tip's origin, the origin of each movable
+            joint's link, speed_points) moves faster in any cycle; the motion slows down along its
+            direction. 0.25 is the reduced speed of ISO 10218-1. inf: no such limit.
+        speed_points: (k, 3) [m] further points that max_tool_speed checks, in the tip's frame, k ≤ 8; None:
+            none.
         length_scale: [m] > 0: 1 rad/s weighs as much as length_scale m/s, as for VelocitySolver. None:
             chain.characteristic_length.
+        joint_weights: (n,) > 0, how much each joint's motion counts where there are more joints than rows:
+            a rail with 1e4 moves only where the other joints cannot do the motion. Only ratios matter.
+            None: all 1.
         guided: whether the servo takes another way to a pose target that rests where its own way does not
             arrive: through another configuration of the arm, if need be away from the tool's straight line.
             `step.guide` says so. Arrives at each target that PositionIk finds.
+        collisions: what the arm must not touch: no command brings a pair of bodies nearer than the margin.
+            None: nothing is checked.
+        strict: whether `update` raises Error for a target that is no pose, in place of BAD_INPUT and a
+            stop.
         mask: (6,) truth values: the rows (vx, vy, vz, ωx, ωy, ωz) that matter; None: all.
         frame: the axes of these rows, the base's or the tool's.
         """
@@ -1406,11 +1436,6 @@ class ServoBatch:
         """
 
 # ---- Servo loop -------------------------------------------------------------------------------------------------------
-    @property
-    def tool(self) -> numpy.typing.NDArray[numpy.float64]:
-        """
-        (4, 4) of set_tool(), in the chain's tip.
-        """
 class LoopCommand(enum.IntEnum):
     """
     What a cycle of a ServoLoop followed.
@@ -1624,7 +1649,7 @@ class ServoLoop:
 
         Raises Error where the arm does not rest yet, a fault is not acknowledged, or somebody else owns the arm.
         """
-    def set_tool(self, tool: numpy.typing.ArrayLike, token: LoopToken | None = None) -> None:
+    def set_tool(self, tool: typing.Any, token: LoopToken | None = None) -> None:
         """
         Puts a tool (4, 4) on the tip from the next cycle on, without a jump: see Servo.set_tool.
 
@@ -2019,7 +2044,7 @@ class Dynamics:
         gravity: (3,) [m/s²] in base axes; by default 9.80665 m/s² along −z.
         payload: what the tip carries, in the tip's frame.
 
-        Raises Error where a link has a principal moment below 0, where a movable joint carries no link whose inertia is known, and where the payload is no body:
+        Raises Error where a movable joint carries no link whose inertia is known, and where the payload is no body:
         a mass below 0, a tensor that is not symmetric, a principal moment beyond the sum of the other two.
         """
     def __repr__(self) -> str:
@@ -2928,6 +2953,10 @@ def clearance(chain: Chain, sets: SingularSets | None, t: numpy.typing.ArrayLike
     width: η₂ [1/rad²]: sets of codimension above 1 count as crossed where ψ < 1/(2 width) between ends that are
         both outside.
     """
+def nearest_turn(chain: Chain, start: numpy.typing.ArrayLike, goal: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    The goal (n,) with each continuous joint on the turn nearest to the start, at most π away.
+    """
 def play(trajectory: Trajectory, servo: Servo, *, settle: typing.SupportsFloat | typing.SupportsIndex = 0.5) -> Playback:
     """
     Plays a planned motion through a servo that stands at its start, as poses with feed-forward twists, at the
@@ -3125,10 +3154,6 @@ def draw_from_prior(chain: Chain, cost: JointCost, states: typing.SupportsInt | 
     """
     q (states, n) of a motion from the prior about the straight line: a first guess of the planner with this cost.
     """
-def nearest_turn(chain: Chain, start: numpy.typing.ArrayLike, goal: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
-    """
-    The goal (n,) with each continuous joint on the turn nearest to the start, at most π away.
-    """
 def plan_gradient(chain: Chain, start: numpy.typing.ArrayLike, goal: numpy.typing.ArrayLike, python_costs: collections.abc.Sequence[typing.Any], cost: JointCost | None = None, spheres: ArmSpheres | None = None, field: DistanceField | None = None, *, states: typing.SupportsInt | typing.SupportsIndex = 21, prior_weight: typing.SupportsFloat | typing.SupportsIndex = 10.0, max_iterations: typing.SupportsInt | typing.SupportsIndex = 100, tolerance: typing.SupportsFloat | typing.SupportsIndex = 0.0001, restarts: typing.SupportsInt | typing.SupportsIndex = 8, duration: typing.SupportsFloat | typing.SupportsIndex | None = None, whole_turns: bool = False) -> Trajectory:
     """
     `sigmaik.planning.gradient` is what to call.
@@ -3144,8 +3169,8 @@ def plan_gradient(chain: Chain, start: numpy.typing.ArrayLike, goal: numpy.typin
         answer.
     duration: [s] > 0. None: the shortest that keeps the limits of velocity and acceleration, 1 s where
         there are none.
-    whole_turns: whether goals count whole turns. False: continuous joints take the shorter way, of at most
-        half a turn.
+    whole_turns: whether goals count whole turns. False: continuous joints take the shorter way, of at
+        most half a turn.
     """
 def plan_stochastic(chain: Chain, start: numpy.typing.ArrayLike, goal: numpy.typing.ArrayLike, python_costs: collections.abc.Sequence[typing.Any], cost: JointCost | None = None, spheres: ArmSpheres | None = None, field: DistanceField | None = None, seed: typing.SupportsInt | typing.SupportsIndex | None = None, *, states: typing.SupportsInt | typing.SupportsIndex = 21, samples: typing.SupportsInt | typing.SupportsIndex = 10, max_iterations: typing.SupportsInt | typing.SupportsIndex = 30, deviation: typing.SupportsFloat | typing.SupportsIndex = 0.5, decay: typing.SupportsFloat | typing.SupportsIndex = 0.98, temperature: typing.SupportsFloat | typing.SupportsIndex = 0.1, prior_weight: typing.SupportsFloat | typing.SupportsIndex = 10.0, tolerance: typing.SupportsFloat | typing.SupportsIndex = 0.001, refine: bool = False, duration: typing.SupportsFloat | typing.SupportsIndex | None = None, whole_turns: bool = False) -> Trajectory:
     """
@@ -3163,8 +3188,8 @@ def plan_stochastic(chain: Chain, start: numpy.typing.ArrayLike, goal: numpy.typ
         objective.
     refine: whether `gradient` finishes the motion that the samples found.
     duration: [s] as for `gradient`.
-    whole_turns: whether goals count whole turns. False: continuous joints take the shorter way, of at most
-        half a turn.
+    whole_turns: whether goals count whole turns. False: continuous joints take the shorter way, of at
+        most half a turn.
     """
 def spline_velocities(q: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
     """
