@@ -229,7 +229,7 @@ void bind_world(py::class_<Collisions>& c) {
       .def("detach", &Collisions::detach, "Lets go of the object.")
       .def("__copy__", [](const Collisions& s) { return s; })
       .def(
-          "__deepcopy__", [](const Collisions& s, const py::dict&) { return s; }, py::arg("memo"))
+          "__deepcopy__", [](const Collisions& s, const py::object&) { return s; }, py::arg("memo"))
       .def(
           "distance",
           [](const Collisions& s, const ArrayLike& q) {

@@ -11,7 +11,10 @@
 Units are m, rad, s, N·m. Twists and Jacobians are [v; ω], in base axes, at the tip's origin.
 """
 
-from . import _rules, indices, methods, models, planning, robots, sim, singularities
+import importlib
+from typing import TYPE_CHECKING
+
+from . import _rules, indices, methods, planning, robots, sim, singularities
 from ._core import (
     ActionChunks,
     ActionStatus,
@@ -70,6 +73,9 @@ from ._core import (
     solve_batch,
 )
 from ._rules import *  # noqa: F403  # the rules' classes
+
+if TYPE_CHECKING:
+    from . import models
 
 __all__ = [
     "ActionChunks",
@@ -136,3 +142,9 @@ __all__ = [
     "solve_batch",
 ]
 __all__ += _rules.__all__
+
+
+def __getattr__(name: str) -> object:
+    if name == "models":  # reads XML, and is seldom needed
+        return importlib.import_module(".models", __name__)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -878,7 +878,7 @@ class Collisions:
     """
     def __copy__(self) -> Collisions:
         ...
-    def __deepcopy__(self, memo: dict) -> Collisions:
+    def __deepcopy__(self, memo: typing.Any) -> Collisions:
         ...
     def __init__(self, chain: Chain, obstacles: typing.Any = None, self_collision: bool = True, margin: typing.SupportsFloat | typing.SupportsIndex = 0.01, *, source: typing.Any = None, srdf: typing.Any = None, radius: typing.SupportsFloat | typing.SupportsIndex = 0.05, capsules: typing.SupportsInt | typing.SupportsIndex | None = None, ignore: collections.abc.Sequence[tuple[str, str]] = [], arm: collections.abc.Sequence[LinkCapsule] | None = None) -> None:
         """

@@ -51,7 +51,7 @@ def test_a_method_cannot_be_made_of_nothing():
 def test_a_name_is_accepted_wherever_a_method_is():
     expected = sk.VelocitySolver(sk.JParse(gamma=0.3)).solve(J, TWIST).qdot
     np.testing.assert_array_equal(sk.VelocitySolver("jparse:gamma=0.3").solve(J, TWIST).qdot, expected)
-    np.testing.assert_array_equal(sk.solve_batch("jparse:gamma=0.3", J[None], TWIST[None])[0], expected)
+    np.testing.assert_allclose(sk.solve_batch("jparse:gamma=0.3", J[None], TWIST[None])[0], expected, rtol=1e-12)
     solver = sk.VelocitySolver("dls")
     assert solver.method == sk.DampedLeastSquares()
     solver.method = "jparse:gamma=0.3"

@@ -129,7 +129,7 @@ def test_plans_take_the_shorter_way_round(way):
     arm = sk.Chain.from_urdf(planar("<limit velocity='2' effort='1' acceleration='2'/>", LIMIT))
     start, goal = np.array([0.3, 0.2]), np.array([0.3 + way, -0.2])
     shorter = (way + np.pi) % (2 * np.pi) - np.pi
-    for plan in (sk.planning.time_optimal(arm, start, goal), sk.planning.gradient(arm, start, goal, index=None)):
+    for plan in (sk.planning.time_optimal(arm, start, goal), sk.planning.gradient(arm, start, goal)):
         assert plan.q[-1, 0] - start[0] == pytest.approx(shorter)
     long = sk.planning.time_optimal(arm, start, goal, whole_turns=True)
     assert long.q[-1, 0] - start[0] == pytest.approx(way)

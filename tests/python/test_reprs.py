@@ -37,6 +37,7 @@ def shown() -> list[object]:
     puma = sk.AnalyticIk(sk.robots.load("puma560"))
     position = sk.PositionIk(arm)
     plan = sk.planning.time_optimal(arm, q, q + 0.1)
+    collisions = sk.Collisions(arm, [sk.Obstacle.sphere([1.0, 0.0, 0.5], 0.1)])
     return [
         arm,
         arm.limits,
@@ -72,6 +73,10 @@ def shown() -> list[object]:
         sk.singularities.of(sk.robots.load("franka_panda")),
         plan,
         plan.clearance,
+        collisions,
+        collisions.obstacles[0],
+        collisions.capsules[0],
+        collisions.capsules[0].capsule,
     ]
 
 

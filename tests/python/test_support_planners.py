@@ -46,7 +46,7 @@ def objective(arm, plan, prior_weight, k=6.0):
 def test_objective_is_what_is_said_and_better_than_the_line(name, planner):
     arm, tasks = pairs(name, 10)
     for start, goal in tasks:
-        plan = planner(arm, start, goal, prior_weight=10.0)
+        plan = planner(arm, start, goal, prior_weight=10.0, whole_turns=True)
         line = start + np.linspace(0, 1, 21)[:, None] * (goal - start)
         straight = np.sum(np.minimum(sk.indices.evaluate(arm, line[1:-1], "geometry_aware"), 2000.0))
         assert plan.cost <= straight

@@ -74,7 +74,7 @@ def test_errors_name_the_file(tmp_path):
         (arm(more="<link name='b'/>" + B_ON_A), {}, ["2 leaves below 'base'", "'tip', 'b'"]),
         (arm(""), {}, ["[j2]", "limits"]),
         (arm(kind="floating"), {}, ["'j2'", "floating"]),
-        (arm(LIMIT + "<mimic joint='j1'/>"), {}, ["'j2' mimics joint 'j1'"]),
+        (arm(LIMIT + "<mimic joint='j2'/>"), {}, ["'j2'", "mimic"]),
         (arm("<limit lower='2' upper='1' velocity='1' effort='1'/>"), {}, ["'j2'", "lower = 2", "upper = 1"]),
         (arm("<limit lower='-1' upper='1' velocity='nan' effort='1'/>"), {}, ["'j2'", 'velocity="nan"']),
         (arm("<origin xyz='%s%n 0 0'/>" + LIMIT), {}, ["'j2'", "%s%n"]),

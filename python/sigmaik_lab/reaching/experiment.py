@@ -154,15 +154,31 @@ def solve_task(
     )
 
 
+# The goal is the paper's configuration, and no other turn of it.
 _PLANNERS: dict[str, Callable[[sk.Chain, Array, Array, int, Planning], sk.planning.Trajectory]] = {
     "gradient": lambda chain, a, b, seed, p: sk.planning.gradient(
-        chain, a, b, states=p.states, prior_weight=p.prior_weight, duration=1.0
+        chain, a, b, states=p.states, prior_weight=p.prior_weight, duration=1.0, whole_turns=True
     ),
     "stochastic": lambda chain, a, b, seed, p: sk.planning.stochastic(
-        chain, a, b, seed=seed, states=p.states, samples=p.samples, prior_weight=p.prior_weight, duration=1.0
+        chain,
+        a,
+        b,
+        seed=seed,
+        states=p.states,
+        samples=p.samples,
+        prior_weight=p.prior_weight,
+        duration=1.0,
+        whole_turns=True,
     ),
     "manipulability": lambda chain, a, b, seed, p: sk.planning.gradient(
-        chain, a, b, index="manipulability", states=p.states, prior_weight=0.1 * p.prior_weight, duration=1.0
+        chain,
+        a,
+        b,
+        index="manipulability",
+        states=p.states,
+        prior_weight=0.1 * p.prior_weight,
+        duration=1.0,
+        whole_turns=True,
     ),
 }
 
