@@ -16,6 +16,7 @@ MODULES = [
     "",
     ".indices",
     ".methods",
+    ".models",
     ".planning",
     ".planning.costs",
     ".robots",

@@ -83,9 +83,9 @@ struct JointLimits {
 
 /// How a joint that moves depends on the joint positions q: its position is multiplier · q[joint] + offset.
 struct Coupling {
-  int joint = 0;
-  double multiplier = 1.0;
-  double offset = 0.0;
+  int joint = 0;            ///< of q
+  double multiplier = 1.0;  ///< not 0
+  double offset = 0.0;      ///< [rad or m]
 };
 
 /// Constants of a movable joint for the kinematics, laid out for one flat pass. Fixed joints are folded in, and frames

@@ -88,17 +88,20 @@ struct Obstacle {
     Cylinder,   ///< along z, with flat ends
     HalfSpace,  ///< z ≤ 0
   };
-  Shape shape = Shape::Sphere;
-  Pose pose = Pose::Identity();
+  Shape shape = Shape::Sphere;   ///< in its own frame
+  Pose pose = Pose::Identity();  ///< of this frame in base
   /// [m] sphere: radius; capsule: radius, length of the segment; box: sides; cylinder: radius, length.
   Eigen::Vector3d size = Eigen::Vector3d::Zero();
   std::string name{};                ///< empty: "obstacle i"
   std::vector<std::string> links{};  ///< the links that have to keep clear; empty: all links that a joint moves
 
-  /// The obstacles by their usual data, in base [m].
+  /// A ball, in base [m].
   static Obstacle sphere(const Eigen::Vector3d& center, double radius);
+  /// The points within `radius` of the segment from a to b, in base [m].
   static Obstacle capsule(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double radius);
+  /// A box about the origin of `pose` [m].
   static Obstacle box(const Pose& pose, const Eigen::Vector3d& sides);
+  /// A cylinder along z of `pose`, about its origin [m].
   static Obstacle cylinder(const Pose& pose, double radius, double length);
   /// The side of the plane through `point` that `normal` points away from: a floor, a wall, a side of a work space.
   static Obstacle half_space(const Eigen::Vector3d& point, const Eigen::Vector3d& normal);
@@ -111,7 +114,7 @@ struct CollisionOptions {
   /// URDF with the links' shapes: a file's path or the XML; empty: the URDF that the chain was read from. Without a
   /// URDF capsules of `radius` run from each link's frame to the next.
   std::string source{};
-  /// SRDF whose <disable_collisions> name pairs of links that need no check: a file's path or the XML; empty: none.
+  /// SRDF whose `disable_collisions` name pairs of links that need no check: a file's path or the XML; empty: none.
   std::string srdf{};
   double radius = 0.05;  ///< [m] > 0, of links with meshes, and without a URDF
   int capsules = 0;      ///< most capsules of the arm, at least one a link; 0: three more than joints
@@ -122,7 +125,8 @@ struct CollisionOptions {
 /// (Collisions::body_names()).
 struct Proximity {
   double distance = std::numeric_limits<double>::infinity();  ///< [m], below 0: contact; infinite: there is no pair
-  int body = -1, other = -1;                                  ///< the body that more joints move comes first
+  int body = -1;                                              ///< the body that more joints move
+  int other = -1;                                             ///< the other body, or the obstacle
   Eigen::Vector3d point = Eigen::Vector3d::Zero();            ///< [m] on `body`, in base
   Eigen::Vector3d other_point = Eigen::Vector3d::Zero();      ///< [m] on `other`, in base
 };

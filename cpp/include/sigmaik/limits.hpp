@@ -105,7 +105,7 @@ struct LimitOptions {
 /// makes cycles of nearly no time, in which no controller acts. After 20 cycles without a command the controllers of
 /// arms stop by themselves (libfranka: 20 packets), and the gains of a servo are for cycles that are not longer by
 /// orders.
-inline constexpr double kShortestCycle = 0.1, kLongestCycle = 20.0;
+inline constexpr double kShortestCycle = 0.1, kLongestCycle = 20.0;  ///< see kShortestCycle
 
 /// Kind of limit that forms a bound.
 enum class LimitKind : std::int8_t { None, Position, Velocity, Acceleration, Jerk };
