@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sigmaik._core import Chain, Error
+from sigmaik._core import Chain, Error, rotation_exp
 from sigmaik._types import Array
 
 __all__ = ["Frames"]
@@ -88,11 +88,7 @@ def _origin(origin: ET.Element | None) -> Array:
     pose = np.eye(4)
     if origin is not None:
         roll, pitch, yaw = _numbers(origin.get("rpy", "0 0 0"))
-        pose[:3, :3] = (
-            _rotation(np.array([0.0, 0.0, 1.0]), yaw)
-            @ _rotation(np.array([0.0, 1.0, 0.0]), pitch)
-            @ _rotation(np.array([1.0, 0.0, 0.0]), roll)
-        )
+        pose[:3, :3] = rotation_exp([0.0, 0.0, yaw]) @ rotation_exp([0.0, pitch, 0.0]) @ rotation_exp([roll, 0.0, 0.0])
         pose[:3, 3] = _numbers(origin.get("xyz", "0 0 0"))
     return pose
 
@@ -101,15 +97,7 @@ def _moved(joint: _Joint, position: float) -> Array:
     pose = np.eye(4)
     length = float(np.linalg.norm(joint.axis))
     if joint.kind in ("revolute", "continuous") and length > 0.0:
-        pose[:3, :3] = _rotation(joint.axis / length, position)
+        pose[:3, :3] = rotation_exp(joint.axis / length * position)
     elif joint.kind == "prismatic" and length > 0.0:
         pose[:3, 3] = joint.axis / length * position
     return pose
-
-
-def _rotation(axis: Array, angle: float) -> Array:
-    """(3, 3) by Rodrigues' formula; axis (3,) of length one."""
-    x, y, z = axis
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    rotation: Array = np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
-    return rotation
