@@ -14,7 +14,6 @@ from sigmaik._extras import need
 need("rclpy")
 
 import rclpy.lifecycle  # noqa: E402
-import rclpy.node  # noqa: E402
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue  # noqa: E402
 from geometry_msgs.msg import PoseStamped, TwistStamped  # noqa: E402
 from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult  # noqa: E402
@@ -154,9 +153,9 @@ class ServoNode(rclpy.lifecycle.LifecycleNode):  # type: ignore[misc]
         subscribe, serve = self.create_subscription, self.create_service
         self._out_type = OUT_TYPES.index(self._value("command_out_type"))
         message = (JointTrajectory, Float64MultiArray)[self._out_type]
-        self._commands = rclpy.node.Node.create_publisher(self, message, self._value("command_out_topic"), 10)
-        self._status = rclpy.node.Node.create_publisher(self, Int8, self._value("status_topic"), 10)
-        self._diagnostics = rclpy.node.Node.create_publisher(self, DiagnosticArray, "/diagnostics", 10)
+        self._commands = self.create_publisher(message, self._value("command_out_topic"), 10)
+        self._status = self.create_publisher(Int8, self._value("status_topic"), 10)
+        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self._interfaces = [
             (self.destroy_publisher, self._commands),
             (self.destroy_publisher, self._status),
