@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "bracket.hpp"
 #include "jerk_stop.hpp"
 #include "numbers.hpp"
 #include "work.hpp"
@@ -14,30 +15,18 @@ constexpr int kMostEvaluations = 16;
 double square(double x) noexcept { return x * x; }
 
 // Almost the largest x in [a, b] with f(x) ≤ 0, and never a larger one, for an increasing f with f(a) = fa ≤ 0 and fb =
-// f(b). Regula falsi (Illinois), kept away from the ends.
+// f(b).
 template <typename Function>
 double largest_below_zero(double a, double fa, double b, double fb, Function f) noexcept {
   const double tolerance = kLimitTolerance * (b - a);
   if (fb <= 0.0) return b;
-  int side = 0;
-  for (int k = 0; k < kMostEvaluations && b - a > tolerance; ++k) {
-    const double margin = 0.01 * (b - a);
-    const double x = std::clamp(a + (b - a) * (fa / (fa - fb)), a + margin, b - margin);
-    const double fx = f(x);
+  Bracket bracket{a, fa, b, fb};
+  for (int k = 0; k < kMostEvaluations && bracket.width() > tolerance; ++k) {
+    const double x = bracket.inside(bracket.root());
+    bracket.take(x, f(x));
     count_work(&Work::evaluations, 1);
-    if (fx <= 0.0) {
-      a = x;
-      fa = fx;
-      if (side == -1) fb *= 0.5;
-      side = -1;
-    } else {
-      b = x;
-      fb = fx;
-      if (side == 1) fa *= 0.5;
-      side = 1;
-    }
   }
-  return a;
+  return bracket.a;
 }
 
 // Acceleration and jerk first, then velocity, then position: each limit lowers the bound that the limits before it

@@ -6,6 +6,7 @@
 
 #include <sigmaik/servo.hpp>
 
+#include "bracket.hpp"
 #include "numbers.hpp"
 #include "walk.hpp"
 
@@ -126,30 +127,17 @@ double Servo::tool_speed_part(const JointVector& qdot) const noexcept {
   return fastest / (options_.max_tool_speed * (1.0 - kReserve));
 }
 
-// From `slow`, which holds the limit, as far as possible to `fast`, which does not (regula falsi, Illinois).
+// From `slow`, which holds the limit, as far as possible to `fast`, which does not.
 JointVector Servo::nearest_slow(const JointVector& slow, const JointVector& fast) const noexcept {
   constexpr double kNear = 1e-9;
-  double a = 0.0, fa = tool_speed_part(slow) - 1.0, b = 1.0, fb = tool_speed_part(fast) - 1.0;
+  detail::Bracket bracket{0.0, tool_speed_part(slow) - 1.0, 1.0, tool_speed_part(fast) - 1.0};
   JointVector best = slow;
-  int side = 0;
-  for (int k = 0; k < kEvaluations && b - a > kNear && fa < -kNear; ++k) {
-    const double margin = 0.01 * (b - a), root = a + (b - a) * (fa / (fa - fb));
-    const double x = fb < kInfinity && root > a ? std::clamp(root - 0.5 * kNear, a + margin, b - margin)
-                                                : 0.5 * (a + b);
+  for (int k = 0; k < kEvaluations && bracket.width() > kNear && bracket.fa < -kNear; ++k) {
+    const double root = bracket.root();
+    const bool on_line = bracket.fb < kInfinity && root > bracket.a;
+    const double x = on_line ? bracket.inside(root - 0.5 * kNear) : 0.5 * (bracket.a + bracket.b);
     const JointVector at = slow + x * (fast - slow);
-    const double fx = tool_speed_part(at) - 1.0;
-    if (fx <= 0.0) {
-      a = x;
-      fa = fx;
-      best = at;
-      if (side == -1) fb *= 0.5;
-      side = -1;
-    } else {
-      b = x;
-      fb = fx;
-      if (side == 1) fa *= 0.5;
-      side = 1;
-    }
+    if (bracket.take(x, tool_speed_part(at) - 1.0)) best = at;
   }
   return best;
 }
