@@ -189,7 +189,8 @@ void bind_cycle(py::class_<Servo>& c) {
          const Pose pose = s.options().strict ? pose_argument(target, "target") : target_argument(target, "target");
          const Twist twist = feedforward ? twist_argument(*feedforward, "feedforward") : Twist(Twist::Zero());
          const ServoStep step = s.update(pose, twist, time);
-         return is_pose(pose.matrix()) ? checked(step) : step;
+         const bool no_pose = step.status == Status::BadInput && !is_pose(pose.matrix());
+         return no_pose ? step : checked(step);
        },
        py::arg("target"), py::arg("feedforward") = py::none(), py::arg("dt") = py::none(),
        "One cycle towards a pose (4, 4) of the tip in the base.\n\n"

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "asked_pose.hpp"
 #include "finite.hpp"
 #include "length.hpp"
 #include "message.hpp"
@@ -120,8 +121,9 @@ ChunkStatus ActionChunks::push(double stamp, std::span<const Pose> poses) noexce
   to.anchored = true;
   to.count = static_cast<int>(poses.size());
   for (std::size_t i = 0; i < poses.size(); ++i) {
-    to.knots[i].pose = nearest_pose(poses[i]);
-    if (is_rough(poses[i])) ++counts_.rough;
+    const detail::AskedPose read(poses[i]);
+    to.knots[i].pose = read.pose;
+    if (read.rough) ++counts_.rough;
   }
   shape(to);
   return status;

@@ -8,6 +8,7 @@
 
 #include <sigmaik/pose.hpp>
 
+#include "asked_pose.hpp"
 #include "constrained_ik_parts.hpp"
 #include "message.hpp"
 #include "numbers.hpp"
@@ -106,9 +107,9 @@ ConstrainedIkStep ConstrainedIk::update(const Pose& asked) noexcept {
     step.q = step.qdot = JointVector::Zero(chain_.dof());
     return step;
   }
-  const bool good = is_pose(asked.matrix());
-  const Pose target = good ? nearest_pose(asked) : asked;
-  if (!good) {
+  const detail::AskedPose read(asked);
+  const Pose& target = read.pose;
+  if (!read.valid) {
     step.qdot = tracker_.stop();
   } else {
     const Twist motion = pose_error(reference_, target);
@@ -125,12 +126,12 @@ ConstrainedIkStep ConstrainedIk::update(const Pose& asked) noexcept {
   }
   const bool held = step.active != 0 || step.torque_active || step.error_active || !step.exact_met;
   last_free_ = step.used == IkSource::Analytic ||
-               (good && analytic_ && !dynamics_ && !held && agrees(*analytic_, target, tracker_, step.qdot));
+               (read.valid && analytic_ && !dynamics_ && !held && agrees(*analytic_, target, tracker_, step.qdot));
   tracker_.advance(step.qdot);
   step.not_settling = rested_ >= settling_time() && !tracker_.resting();
   step.q = tracker_.q();
   sigmaik::update(chain_, step.q, state_);
-  if (!good) {
+  if (!read.valid) {
     reference_ = state_.tip;
     return step;
   }

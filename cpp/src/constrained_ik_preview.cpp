@@ -175,7 +175,7 @@ void ConstrainedIk::set_limits(Preview::Point& point, double step, const Twist& 
   // From x at the point, x is x + u Δℓ in the middle.
   for (int i = 0; i < 6; ++i) {
     const auto k = static_cast<std::size_t>(i);
-    const double limit = kReserve * std::min(tracker_.acceleration_limit(i), tracker_.deceleration_limit(i));
+    const double limit = kReserve * tracker_.least_acceleration(i);
     double a = slope[i] + step * bend[i], b = bend[i];
     if (a < 0.0) {
       a = -a;

@@ -71,7 +71,9 @@ PositionIkOptions of_search(const Servo& servo) {
 }  // namespace
 
 Guide::Guide(const Servo& servo)
-    : predictor_(servo.chain(), servo.method(), of_predictor(servo)), ik_(servo.chain(), of_search(servo)) {}
+    : predictor_(servo.chain(), servo.method(), of_predictor(servo)), ik_(servo.chain(), of_search(servo)) {
+  predictor_.elbow_ = servo.elbow_;
+}
 
 void Guide::set_method(const Method& method) {
   predictor_.set_method(method);
@@ -189,6 +191,7 @@ void Guide::start_prediction(const Left& left, const Servo& servo, bool with_pos
   with_posture_ = with_posture;
   predictor_.guided_posture_ = with_posture ? goal_ : JointVector();
   predictor_.reset(servo.q(), servo.qdot());
+  predictor_.elbow_out_ = servo.elbow_out_;
   predictor_.nominal_ = servo.nominal_;
   predictor_.fade_ = servo.fade_;
   predicted_ = 0.0;

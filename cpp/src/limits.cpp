@@ -268,20 +268,21 @@ double LimitTracker::towards(int i, double room) const noexcept {
   return room >= 0.0 ? fastest : -std::min(fastest, recovery(i, -room * cycle_));
 }
 
+double LimitTracker::heading_before(int i, double room) const noexcept {
+  const auto at = static_cast<std::size_t>(i);
+  if (!(room < kInfinity)) return kInfinity;
+  const double most = towards(i, room);
+  if ((with_jerk_ >> i & 1u) == 0 || room < 0.0) return most;
+  return std::min(most, speed_before(room, kArrivalAcceleration * braking_[at], kArrivalJerk * jerk_[at]));
+}
+
 VelocityBounds LimitTracker::heading() const noexcept {
   VelocityBounds out;
   out.lower.resize(n_);
   out.upper.resize(n_);
   for (int i = 0; i < n_; ++i) {
-    const auto at = static_cast<std::size_t>(i);
-    const auto speed = [&](double room) {
-      if (!(room < kInfinity)) return kInfinity;
-      const double most = towards(i, room);
-      if ((with_jerk_ >> i & 1u) == 0 || room < 0.0) return most;
-      return std::min(most, speed_before(room, kArrivalAcceleration * braking_[at], kArrivalJerk * jerk_[at]));
-    };
     Window window{-kInfinity, kInfinity, LimitKind::None, LimitKind::None};
-    window.narrow(-speed(room_below(i)), speed(room_above(i)), LimitKind::Position);
+    window.narrow(-heading_before(i, room_below(i)), heading_before(i, room_above(i)), LimitKind::Position);
     put(i, window, out);
   }
   return out;
@@ -365,7 +366,7 @@ double LimitTracker::least_jerk() const noexcept {
 
 double LimitTracker::least_acceleration() const noexcept {
   double least = kInfinity;
-  for (int i = 0; i < n_; ++i) least = std::min({least, acceleration_limit(i), deceleration_limit(i)});
+  for (int i = 0; i < n_; ++i) least = std::min(least, least_acceleration(i));
   return least;
 }
 
@@ -398,8 +399,7 @@ double LimitTracker::longest_settling() const noexcept {
     const auto at = static_cast<std::size_t>(i);
     const double range = upper_[at] - lower_[at], way = range < kInfinity ? range : kTurn;
     // The time of a motion with each limit alone adds up to more than that of a motion with all limits.
-    longest = std::max(longest, way / velocity_[at] +
-                                    2.0 * std::sqrt(way / std::min(acceleration_limit(i), deceleration_limit(i))) +
+    longest = std::max(longest, way / velocity_[at] + 2.0 * std::sqrt(way / least_acceleration(i)) +
                                     4.0 * std::cbrt(way / (jerk_[at] * per_dt_ * per_dt_)));
   }
   return 3.0 + 3.0 * longest;

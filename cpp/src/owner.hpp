@@ -26,5 +26,6 @@ Owner<T>::~Owner() = default;
 
 extern template class Owner<Guide>;
 extern template class Owner<CollisionGuard>;
+extern template class Owner<Elbow>;
 
 }  // namespace sigmaik::detail

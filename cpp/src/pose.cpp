@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "asked_pose.hpp"
 #include "finite.hpp"
 #include "length.hpp"
 
@@ -64,28 +65,38 @@ Twist pose_error(const Pose& current, const Pose& target) noexcept {
 
 namespace {
 
+constexpr double kRough = 2e-9;  // a change of R by δ is a defect of 2 δ
+
 Eigen::Matrix3d defect_of(const Eigen::Matrix3d& r) noexcept {
   return r.transpose().lazyProduct(r) - Eigen::Matrix3d::Identity();
+}
+
+double size_of(const Eigen::Matrix3d& defect) noexcept { return defect.cwiseAbs().maxCoeff(); }
+
+// What is_pose() asks for beside RᵀR = I.
+bool is_right_handed(const PoseMatrix& matrix) noexcept {
+  return matrix.row(3) == Eigen::RowVector4d(0.0, 0.0, 0.0, 1.0) && matrix.topLeftCorner<3, 3>().determinant() > 0.0;
+}
+
+Eigen::Matrix3d nearest_rotation(Eigen::Matrix3d matrix, Eigen::Matrix3d defect) noexcept {
+  // Each step squares the defect: 5e-4, 2e-7, 3e-14, rounding.
+  for (int i = 0; i < 4 && size_of(defect) >= 1e-14; ++i) {
+    const Eigen::Matrix3d change = 0.5 * matrix.lazyProduct(defect);  // the product reads what the difference writes
+    matrix -= change;
+    defect = defect_of(matrix);
+  }
+  return matrix;
 }
 
 }  // namespace
 
 bool is_pose(const PoseMatrix& matrix) noexcept {
-  if (!detail::finite(matrix)) return false;
-  if (matrix.row(3) != Eigen::RowVector4d(0.0, 0.0, 0.0, 1.0)) return false;
   const Eigen::Matrix3d r = matrix.topLeftCorner<3, 3>();
-  return defect_of(r).cwiseAbs().maxCoeff() <= kRotationTolerance && r.determinant() > 0.0;
+  return detail::finite(matrix) && is_right_handed(matrix) && size_of(defect_of(r)) <= kRotationTolerance;
 }
 
 Eigen::Matrix3d nearest_rotation(Eigen::Matrix3d matrix) noexcept {
-  // Each step squares the defect: 5e-4, 2e-7, 3e-14, rounding.
-  for (int i = 0; i < 4; ++i) {
-    const Eigen::Matrix3d defect = defect_of(matrix);
-    if (defect.cwiseAbs().maxCoeff() < 1e-14) break;
-    const Eigen::Matrix3d change = 0.5 * matrix.lazyProduct(defect);  // the product reads what the difference writes
-    matrix -= change;
-  }
-  return matrix;
+  return nearest_rotation(matrix, defect_of(matrix));
 }
 
 Pose nearest_pose(const Pose& pose) noexcept {
@@ -94,8 +105,15 @@ Pose nearest_pose(const Pose& pose) noexcept {
   return out;
 }
 
-bool is_rough(const Pose& pose) noexcept {
-  return defect_of(pose.linear()).cwiseAbs().maxCoeff() > 2e-9;  // a change of R by δ is a defect of 2 δ
+bool is_rough(const Pose& pose) noexcept { return size_of(defect_of(pose.linear())) > kRough; }
+
+detail::AskedPose::AskedPose(const Pose& asked) noexcept : pose(asked) {
+  if (!finite(asked.matrix()) || !is_right_handed(asked.matrix())) return;
+  const Eigen::Matrix3d defect = defect_of(asked.linear());
+  valid = size_of(defect) <= kRotationTolerance;
+  if (!valid) return;
+  rough = size_of(defect) > kRough;
+  pose.linear() = nearest_rotation(asked.linear(), defect);
 }
 
 }  // namespace sigmaik

@@ -6,7 +6,9 @@
 
 #include <sigmaik/pose.hpp>
 
+#include "asked_pose.hpp"
 #include "collision_guard.hpp"
+#include "elbow.hpp"
 #include "finite.hpp"
 #include "guide.hpp"
 #include "length.hpp"
@@ -106,6 +108,7 @@ Servo::Servo(Chain chain, const Method& method, const ServoOptions& options)
   following_error_ = expected_error_ = JointVector::Zero(chain_.dof());
   expect_motion();
   set_collisions();
+  if (options.guided && options.limits.position) elbow_ = detail::Owner(detail::Elbow::with_short_side(chain_));
   if (options.guided) guide_ = detail::Owner<detail::Guide>(std::make_unique<detail::Guide>(*this));
 }
 
@@ -130,6 +133,7 @@ void Servo::begin(const JointRef& posture) noexcept {
   slowing_.reset();
   exact_spectrum_ = rest_spectrum_ = Spectrum{};
   locate();
+  watch_elbow(true);
   look_around(nullptr, 0.0);
   fade_ = 0.0;
   expect_motion();
@@ -245,9 +249,10 @@ ServoStep Servo::stop(Status status) noexcept {
 
 ServoStep Servo::update(const Pose& asked, const Twist& feedforward, std::optional<double> dt) noexcept {
   if (!begin_cycle(dt)) return stop(Status::BadInput);
-  if (!is_pose(asked.matrix()) || !detail::finite(feedforward)) return stop(Status::BadInput);
-  if (is_rough(asked)) ++rough_targets_;
-  const Pose target = nearest_pose(asked);
+  const detail::AskedPose read(asked);
+  if (!read.valid || !detail::finite(feedforward)) return stop(Status::BadInput);
+  if (read.rough) ++rough_targets_;
+  const Pose& target = read.pose;
   const Twist error = pose_error(measured_ ? measured_tip_ : state_.tip, target);
   Twist twist = error;
   detail::shorten(twist.head<3>(), max_linear_error_);
@@ -347,7 +352,7 @@ ServoStep Servo::resolve(const Twist& twist, const Twist* feedforward, bool fade
     lead(*goal, step);
     rule = false;
   } else if (tracker_.has_jerk() || !tracker_.bounds().contain(step.qdot) ||
-             (holds_tool_speed() && !(tool_speed_part(step.qdot) <= 1.0)) || !clears(step.qdot)) {
+             (holds_tool_speed() && !(tool_speed_part(step.qdot) <= 1.0)) || folds(step.qdot) || !clears(step.qdot)) {
     limit(step);
     rule = false;
   }
@@ -357,6 +362,7 @@ ServoStep Servo::resolve(const Twist& twist, const Twist* feedforward, bool fade
   }
   if (shield(solution.qdot, step)) rule = false;
   take(step, rule);
+  watch_elbow(goal != nullptr);
   return step;
 }
 

@@ -6,6 +6,8 @@
 
 #include <sigmaik/servo.hpp>
 
+#include "elbow.hpp"
+
 namespace sigmaik {
 namespace {
 
@@ -71,9 +73,43 @@ void Servo::limit(ServoStep& step) noexcept {
   judge(asked, step);
 }
 
+// Whether the elbow is on its long side. `led`: the joints have gone their own way, to whichever side; otherwise an
+// elbow that was on the long side belongs there, though other joints' limits may have carried it a little beyond.
+void Servo::watch_elbow(bool led) noexcept {
+  const detail::Elbow* elbow = elbow_.operator->();
+  if (elbow == nullptr) return;
+  elbow_out_ = elbow->open(tracker_.q()[elbow->joint]) >= 0.0 || (elbow_out_ && !led);
+}
+
+// Whether the elbow would fold to its short side, or could not be stopped before it; see Servo, the elbow's side.
+bool Servo::folds(const JointVector& qdot) const noexcept {
+  const detail::Elbow* elbow = elbow_.operator->();
+  if (elbow == nullptr || !elbow_out_) return false;
+  const double open = elbow->open(tracker_.q()[elbow->joint]);
+  return elbow->open_rate(qdot[elbow->joint]) < -tracker_.heading_speed(elbow->joint, open);
+}
+
+// The heading bounds of the position limits, and of the elbow's side.
+VelocityBounds Servo::heading() const noexcept {
+  VelocityBounds out = tracker_.heading();
+  const detail::Elbow* elbow = elbow_.operator->();
+  if (elbow == nullptr || !elbow_out_) return out;
+  const int i = elbow->joint;
+  const auto at = static_cast<std::size_t>(i);
+  const double most = tracker_.heading_speed(i, elbow->open(tracker_.q()[i]));
+  if (elbow->above && -most > out.lower[i]) {
+    out.lower[i] = std::min(-most, out.upper[i]);
+    out.lower_kind[at] = LimitKind::Position;
+  } else if (!elbow->above && most < out.upper[i]) {
+    out.upper[i] = std::max(most, out.lower[i]);
+    out.upper_kind[at] = LimitKind::Position;
+  }
+  return out;
+}
+
 // Position limits: the command becomes a velocity inside the heading bounds, and inside the velocity limits still.
 void Servo::head(ServoStep& step) noexcept {
-  VelocityBounds heading = tracker_.heading();
+  VelocityBounds heading = this->heading();
   const bool clear = clears(step.qdot);
   if (clear && heading.contain(step.qdot)) return;
   for (int i = 0; i < chain_.dof(); ++i) {

@@ -16,6 +16,7 @@
 
 #include <sigmaik/pose.hpp>
 
+#include "asked_pose.hpp"
 #include "finite.hpp"
 #include "loop_thread.hpp"
 #include "message.hpp"
@@ -317,9 +318,10 @@ void ServoLoop::set_tool(const Pose& tool, LoopToken token) {
 }
 
 void ServoLoop::follow(const Pose& target, double timeout, LoopToken token) {
-  require(is_pose(target.matrix()), "the target is not a pose");
-  command({LoopCommand::FollowPose, deadline(timeout), nearest_pose(target), Twist::Zero()}, token);
-  if (is_rough(target)) rough_targets_.fetch_add(1, std::memory_order_relaxed);
+  const detail::AskedPose read(target);
+  require(read.valid, "the target is not a pose");
+  command({LoopCommand::FollowPose, deadline(timeout), read.pose, Twist::Zero()}, token);
+  if (read.rough) rough_targets_.fetch_add(1, std::memory_order_relaxed);
 }
 
 void ServoLoop::follow_twist(const Twist& twist, double timeout, LoopToken token) {

@@ -97,11 +97,6 @@ double Servo::tool_speed(const JointVector& qdot) const noexcept {
   return fastest;
 }
 
-// [rad/s² or m/s²], with which joint i can brake, whatever its direction.
-double Servo::braking_limit(int i) const noexcept {
-  return std::min(tracker_.acceleration_limit(i), tracker_.deceleration_limit(i));
-}
-
 // In parts of max_tool_speed: the speed over a cycle with q̇, and the highest speed of a stop in proportion after it.
 // At most 1: the limit is held. NaN where numbers are too large.
 double Servo::tool_speed_part(const JointVector& qdot) const noexcept {
@@ -110,7 +105,7 @@ double Servo::tool_speed_part(const JointVector& qdot) const noexcept {
   move(chain_, tracker_.q() + cycle() * qdot, qdot, tool_.translation(), options_.speed_points, to);
   double time = 0.0, delay = 0.0;
   for (int i = 0; i < chain_.dof(); ++i) {
-    const double a = braking_limit(i) * (tracker_.uneven() ? 0.5 : 1.0);
+    const double a = tracker_.least_acceleration(i) * (tracker_.uneven() ? 0.5 : 1.0);
     if (qdot[i] != 0.0) time = std::max(time, std::abs(qdot[i]) / a);
     if (tracker_.has_jerk() && qdot[i] != 0.0) {
       delay = std::max(delay,
@@ -169,7 +164,7 @@ void Servo::hold_tool_speed(ServoStep& step) noexcept {
   const JointVector &last = tracker_.qdot(), asked = step.qdot;
   double time = 0.0;
   for (int i = 0; i < chain_.dof(); ++i) {
-    if (last[i] != 0.0) time = std::max(time, std::abs(last[i]) / braking_limit(i));
+    if (last[i] != 0.0) time = std::max(time, std::abs(last[i]) / tracker_.least_acceleration(i));
   }
   const double left = time > cycle() ? 1.0 - cycle() / time : 0.0;
   const JointVector in_proportion = (left * last).cwiseMax(bounds.lower).cwiseMin(bounds.upper);

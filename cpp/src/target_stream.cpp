@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "asked_pose.hpp"
 #include "length.hpp"
 #include "message.hpp"
 #include "pose_motion.hpp"
@@ -91,14 +92,15 @@ bool TargetStream::reachable(const Sample& from, const Sample& to) const noexcep
 }
 
 SampleStatus TargetStream::push(double time, const Pose& pose) noexcept {
-  if (!std::isfinite(time) || !is_pose(pose.matrix()) || pose.translation().cwiseAbs().maxCoeff() > kFarthest) {
+  const detail::AskedPose read(pose);
+  if (!std::isfinite(time) || !read.valid || pose.translation().cwiseAbs().maxCoeff() > kFarthest) {
     ++counts_.invalid;
     return SampleStatus::Invalid;
   }
   Sample next;
   next.time = time - shift_;
-  next.pose = nearest_pose(pose);
-  if (is_rough(pose)) ++counts_.rough;
+  next.pose = read.pose;
+  if (read.rough) ++counts_.rough;
 
   if (of_another_clock(next.time)) {
     const bool ahead = next.time > time_;

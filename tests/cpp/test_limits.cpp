@@ -510,6 +510,7 @@ TEST_CASE("heading bounds: position limits alone, with the room to stop, in fron
       for (const bool up : {false, true}) {
         const double room = up ? half - tracker.q()[0] : tracker.q()[0] + half;
         const double v = up ? heading.upper[0] : -heading.lower[0];
+        CHECK(tracker.heading_speed(0, room) == doctest::Approx(v).epsilon(1e-12));
         double sum = 0.0;
         if (room > 1e6 * a * dt * dt) {
           sum = 0.5 * v * v / a + 0.5 * v * dt;  // of so many cycles, but for a cycle's change

@@ -139,6 +139,7 @@ void add_limits(Calls& calls) {
   const JointVector fast = JointVector::Constant(7, 1.0);
   calls.emplace("limits.hpp continue_from", [=] { other->continue_from(*tracker); });
   calls.emplace("limits.hpp heading", [=] { use(tracker->heading().upper[0]); });
+  calls.emplace("limits.hpp heading_speed", [=] { use(tracker->heading_speed(0, 0.1)); });
   calls.emplace("limits.hpp arrival", [=] { use(tracker->arrival(fast, 10.0)); });
   calls.emplace("limits.hpp approach", [=] { use(tracker->approach(fast)[0]); });
   calls.emplace("limits.hpp set_cycle", [=] {

@@ -34,6 +34,7 @@ EXTRAS = (
     "pyarrow",
     "distributed",
     "pygame",
+    "rclpy",
 )
 PLAIN = f"""
 import sys
@@ -62,6 +63,7 @@ def plain(*arguments, path=""):
         text=True,
         check=False,
         env=environment,
+        timeout=300,
     )
 
 

@@ -184,7 +184,7 @@ def test_settings_are_the_servos_defaults():
     ours, product = servo.options, sk.Servo(arm).options
     others = {name for name in ours if not np.array_equal(ours[name], product[name])}
     assert others == {"posture", "posture_gain", "guided"}
-    assert servo.method == sk.JParse(singular_posture=True)
+    assert servo.method == sk.JParse()
     session = Session("ufactory_xarm7")
     assert session.length_scale == servo.length_scale == arm.characteristic_length
     session.configure(length_scale=0.5)

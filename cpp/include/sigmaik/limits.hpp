@@ -176,6 +176,9 @@ class LimitTracker {
   /// acceleration, and time, to reach such a velocity. lower ≤ upper; infinite where there is no position limit. A
   /// joint with a jerk limit has the room of arrival(). Real time.
   VelocityBounds heading() const noexcept;
+  /// [rad/s or m/s], the heading bound that a position limit at the distance `way` [rad or m] would make for joint i.
+  /// Where the joint is beyond, `way` < 0, the bound is the velocity that leads back, with a minus sign. Real time.
+  double heading_speed(int i, double way) const noexcept { return heading_before(i, way * per_dt_); }
 
   /// How much of q̇ (n,) a motion may have that is to come to rest after q̇/gain: the largest s in [0, 1] with
   /// s |q̇_i| ≤ D⁻¹(|q̇_i|/gain) for each joint, where D(v) is the distance of the fastest stop from v under a half of
@@ -212,8 +215,10 @@ class LimitTracker {
   bool delays() const noexcept { return has_jerk() || least_acceleration() < std::numeric_limits<double>::infinity(); }
   /// Whether a joint has a jerk limit that is held.
   bool has_jerk() const noexcept { return with_jerk_ != 0; }
-  /// [rad/s² or m/s²], the least of the acceleration and deceleration limits that are held; infinite where there is
-  /// none.
+  /// [rad/s² or m/s²], the smaller of joint i's acceleration and deceleration limits: the joint can do as much
+  /// whichever way it changes its speed.
+  double least_acceleration(int i) const noexcept { return std::min(acceleration_limit(i), deceleration_limit(i)); }
+  /// [rad/s² or m/s²], the least of all joints; infinite where no limit is held.
   double least_acceleration() const noexcept;
   /// [rad/s³ or m/s³], the least of the jerk limits that are held; infinite where there is none.
   double least_jerk() const noexcept;
@@ -278,6 +283,8 @@ class LimitTracker {
   // Room to the position limits of joint i [velocities × cycles]; negative outside.
   double room_above(int i) const noexcept { return (upper_[static_cast<std::size_t>(i)] - q_[i]) * per_dt_; }
   double room_below(int i) const noexcept { return (q_[i] - lower_[static_cast<std::size_t>(i)]) * per_dt_; }
+  // The heading bound of joint i before a position limit that is `room` away.
+  double heading_before(int i, double room) const noexcept;
   // The recovery speed of joint i, `outside` [rad or m] beyond a position limit.
   double recovery(int i, double outside) const noexcept;
   // The velocity from which joint i, without a jerk limit, can just stop before a position limit that is `room` away;

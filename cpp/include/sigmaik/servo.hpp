@@ -23,6 +23,7 @@ namespace sigmaik::detail {
 
 class Guide;
 class CollisionGuard;
+struct Elbow;
 // Owns a part of a servo, which is copied with its servo.
 template <typename T>
 class Owner {
@@ -41,6 +42,7 @@ class Owner {
 };
 extern template class Owner<Guide>;  // each is instantiated where its type is known
 extern template class Owner<CollisionGuard>;
+extern template class Owner<Elbow>;
 
 }  // namespace sigmaik::detail
 
@@ -200,8 +202,15 @@ struct ServoStep {
 /// GuideState::ChangingBranch. Where no configuration is found, the state is Unreachable, and the servo goes its own
 /// way. Prediction and search are cut into slices, so that a cycle stays bounded (some 50 µs more while the guide
 /// works, for a tenth to a third of a second), and they are deterministic. Where the servo's own way arrives, the
-/// commands are those of a servo without a guide. Targets that move, and twists, are never overruled. The constructor
-/// takes about 2 ms.
+/// commands are those of a servo without a guide, but for the elbow's side (below). Targets that move, and twists, are
+/// never led elsewhere. The constructor takes about 2 ms.
+///
+/// *The elbow's side.* The straight elbow is a singularity with the same reaches on either side. On some arms (Panda,
+/// xArm7, Comau Racer) a position limit leaves less than half as much on one side as on the other: an arm that folds to
+/// this short side, on its way back from the edge of its reach, stays stretched out at the limit. A guided servo keeps
+/// the elbow on the long side: the straight angle is a heading bound, like a position limit, for pose targets and for
+/// twists. An elbow on the short side, where it has started or where the guide has led it, is free until it leaves
+/// this side.
 ///
 /// *Time of a cycle.* update(), update_twist() and hold() take the time since the last call on the robot's clock, in
 /// [kShortestCycle, kLongestCycle] times options().dt; options().dt where no time is given. A program that loses a
@@ -360,6 +369,9 @@ class Servo {
 
   // servo_limits.cpp
   void limit(ServoStep& step) noexcept;
+  void watch_elbow(bool led) noexcept;
+  bool folds(const JointVector& qdot) const noexcept;
+  VelocityBounds heading() const noexcept;
   void head(ServoStep& step) noexcept;
   void approach(ServoStep& step, bool redistributes) noexcept;
   void lead(const JointVector& goal, ServoStep& step) noexcept;
@@ -368,7 +380,6 @@ class Servo {
   // servo_speed.cpp
   bool holds_tool_speed() const noexcept { return options_.max_tool_speed < std::numeric_limits<double>::infinity(); }
   double tool_speed(const JointVector& qdot) const noexcept;
-  double braking_limit(int i) const noexcept;
   double tool_speed_part(const JointVector& qdot) const noexcept;
   JointVector nearest_slow(const JointVector& slow, const JointVector& fast) const noexcept;
   JointVector slowest(JointVector qdot, const VelocityBounds& bounds) const noexcept;
@@ -415,6 +426,8 @@ class Servo {
   bool measured_ = false;
   JointVector guided_posture_;                   // the posture that the guide has given; empty: none
   detail::Owner<detail::Guide> guide_;           // null: not guided
+  detail::Owner<detail::Elbow> elbow_;           // null: may fold to either side
+  bool elbow_out_ = false;                       // the elbow is on its long side, to stay there
   detail::Owner<detail::CollisionGuard> guard_;  // null: nothing is checked
 };
 

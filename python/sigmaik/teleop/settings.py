@@ -22,7 +22,7 @@ class Settings:
     method: str = "jparse"  #: as for `sigmaik reach`: "jparse", "dls:damping=0.05"
     gamma: float = 0.1  #: γ of J-PARSE (its largest threshold on σ_i/σ_max) and of its ablations
     singular_gain: float = 1.0  #: J-PARSE's gain in singular directions
-    singular_posture: bool = True  #: whether the posture acts along J-PARSE's singular directions
+    singular_posture: bool = False  #: whether the posture acts along J-PARSE's singular directions
     gain_linear: float = 10.0  #: [1/s] position error to velocity
     gain_angular: float = 10.0  #: [1/s] orientation error to angular velocity
     max_linear_error: float | None = None  #: [m] longer position errors are shortened to this length; None: the servo's

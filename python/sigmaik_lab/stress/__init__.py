@@ -1,4 +1,4 @@
-"""Random cycles into every limit, in pieces, on any executor: counts of each property.
+"""Random cycles into every limit, on any executor: counts of each property.
 
 Runs the C++ programs sigmaik_stress and sigmaik_settling (built by `make build`), each piece with a seed of its own,
 and adds up their tables: how often a property was tried, and how often it failed. A file takes a row for each piece and

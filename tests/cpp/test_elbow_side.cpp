@@ -1,0 +1,161 @@
+// The elbow of a guided servo keeps the side from which the arm can come back.
+
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <string>
+
+#include <sigmaik/pose.hpp>
+#include <sigmaik/servo.hpp>
+
+#include "arms.hpp"
+#include "limit_watch.hpp"
+#include "random.hpp"
+#include "settling.hpp"
+
+namespace {
+
+using namespace sigmaik;
+using test::arms;
+using test::Random;
+
+constexpr double kDt = 2e-3;
+
+// [rad] the straight angle of joint 4 by the makers' drawings: the elbow's offsets, the lengths of upper arm and
+// forearm. The long side is below it.
+const std::map<std::string, double> kStraight{
+    {"franka_panda", -(std::atan(82.5 / 316.0) + std::atan(82.5 / 384.0))},
+    {"ufactory_xarm7", M_PI - (std::atan(52.5 / 293.0) + std::atan(77.5 / 342.5))},
+};
+
+Servo servo_of(const Chain& chain, bool guided) {
+  ServoOptions options;
+  options.dt = kDt;
+  options.guided = guided;
+  return Servo(chain, JParse{}, options);
+}
+
+struct Trip {
+  bool back = false;
+  long broken = 0;       // limits
+  double fourth = -1e9;  // [rad] the largest angle of joint 4
+};
+
+// Pulls the tip by a twist for three seconds, and then back to where it was.
+Trip pull(Servo& servo, const Eigen::Vector3d& direction) {
+  constexpr double kSpeed = 0.3;
+  const Eigen::Vector3d home = servo.tip().translation();
+  Trip trip;
+  test::LimitWatch watch(servo.chain().limits(), kDt, servo.qdot());
+  Twist twist = Twist::Zero();
+  for (int cycle = 0; cycle < static_cast<int>(8.0 / kDt) && !trip.back; ++cycle) {
+    const Eigen::Vector3d way = home - servo.tip().translation();
+    if (cycle * kDt < 3.0) {
+      twist.head<3>() = kSpeed * direction;
+    } else {
+      trip.back = way.norm() < 2e-3;
+      twist.head<3>() = way * std::min(5.0, kSpeed / std::max(way.norm(), 1e-9));
+    }
+    watch.step(servo.update_twist(twist));
+    trip.fourth = std::max(trip.fourth, servo.q()[3]);
+  }
+  trip.broken = watch.broken;
+  return trip;
+}
+
+// A start on the long side, away from the limits.
+JointVector long_side(Random& random, const Chain& chain, double straight) {
+  JointVector q = test::start_of(random, chain, 0.6);
+  q[3] = random.uniform(straight - 1.8, straight - 0.4);
+  return q;
+}
+
+}  // namespace
+
+TEST_CASE("pulled beyond its reach by twists, the elbow stays on its long side, and more ways lead back") {
+  int with = 0, without = 0;
+  for (const auto& [key, straight] : kStraight) {
+    const Chain& chain = arms().at(key);
+    Servo guided = servo_of(chain, true), own = servo_of(chain, false);
+    Random random(8);
+    for (int trial = 0; trial < 25; ++trial) {
+      const std::string& name = key;
+      CAPTURE(name);
+      CAPTURE(trial);
+      const JointVector q = long_side(random, chain, straight);
+      const Eigen::Vector3d direction = random.unit(3);
+      guided.reset(q);
+      own.reset(q);
+      const Trip trip = pull(guided, direction);
+      CHECK(trip.fourth < straight + 1e-2);
+      CHECK(trip.broken == 0);
+      with += trip.back;
+      without += pull(own, direction).back;
+    }
+  }
+  MESSAGE(with, " of 50 come back, ", without, " without the guide");
+  CHECK(with > without);
+}
+
+TEST_CASE("with jerk limits the elbow stays on its long side, too") {
+  Random random(4);
+  for (const auto& [key, straight] : kStraight) {
+    for (int trial = 0; trial < 8; ++trial) {
+      const std::string& name = key;
+      CAPTURE(name);
+      CAPTURE(trial);
+      JointLimits limits = arms().at(key).limits();
+      limits.jerk.setConstant(std::pow(10.0, random.uniform(1.5, 4.0)));
+      const Chain chain = arms().at(key).with_limits(limits);
+      Servo servo = servo_of(chain, true);
+      servo.reset(long_side(random, chain, straight));
+      const Trip trip = pull(servo, random.unit(3));
+      CHECK(trip.fourth < straight + 1e-2);
+      CHECK(trip.broken == 0);
+    }
+  }
+}
+
+TEST_CASE("an arm whose elbow has two long sides follows twists as without the guide, to the last digit") {
+  for (const char* name : {"kuka_lbr_iiwa_14_r820", "ur10", "kinova_gen3_7dof", "puma560", "kuka_kr6_r900"}) {
+    const Chain& chain = arms().at(name);
+    Servo guided = servo_of(chain, true), own = servo_of(chain, false);
+    Random random(3);
+    for (int trial = 0; trial < 4; ++trial) {
+      CAPTURE(name);
+      const JointVector q = test::start_of(random, chain, 0.6);
+      guided.reset(q);
+      own.reset(q);
+      const Twist twist = 0.4 * random.unit(6);
+      for (int cycle = 0; cycle < 1500; ++cycle) {
+        REQUIRE((guided.update_twist(twist).qdot.array() == own.update_twist(twist).qdot.array()).all());
+      }
+    }
+  }
+}
+
+TEST_CASE("an elbow that starts on its short side is free until it leaves this side") {
+  for (const auto& [key, straight] : kStraight) {
+    const Chain& chain = arms().at(key);
+    Servo guided = servo_of(chain, true), own = servo_of(chain, false);
+    Random random(6);
+    int out = 0;
+    for (int trial = 0; trial < 10; ++trial) {
+      JointVector q = long_side(random, chain, straight);
+      q[3] = straight + 0.15;
+      guided.reset(q);
+      own.reset(q);
+      const Twist twist = 0.3 * random.unit(6);
+      bool short_side = true;
+      for (int cycle = 0; cycle < 1500 && short_side; ++cycle) {
+        REQUIRE((guided.update_twist(twist).qdot.array() == own.update_twist(twist).qdot.array()).all());
+        short_side = own.q()[3] > straight;
+      }
+      out += !short_side;
+    }
+    CHECK(out > 0);
+    CHECK(out < 10);
+  }
+}
