@@ -50,7 +50,14 @@ def drill(
     """
     sessions = [
         # The guide would lead the joints past the singularities that the methods are to pass.
-        Session(robot, base=base, tip=tip, settings=Settings(method=method, guided=False, singular_posture=True), rate=rate, pose_timeout=10.0)
+        Session(
+            robot,
+            base=base,
+            tip=tip,
+            settings=Settings(method=method, guided=False, singular_posture=True),
+            rate=rate,
+            pose_timeout=10.0,
+        )
         for robot in robots
         for method in names
     ]
