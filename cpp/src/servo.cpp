@@ -159,8 +159,7 @@ bool Servo::measure(const JointRef& q, const JointRef& qdot) noexcept {
     expected_error_ = following_error_;
     expect_motion();
   }
-  measured_tip_ = pose(chain_, tracker_.q() + following_error_);
-  if (with_tool_) measured_tip_ = measured_tip_ * tool_;
+  locate_measured();
   return true;
 }
 
@@ -187,16 +186,23 @@ void Servo::locate() noexcept {
   }
 }
 
+// The tool where the measured joints, filtered, have it.
+void Servo::locate_measured() noexcept {
+  measured_tip_ = pose(chain_, tracker_.q() + following_error_);
+  if (with_tool_) measured_tip_ = measured_tip_ * tool_;
+}
+
 bool Servo::set_tool(const Pose& tool) noexcept {
-  if (!is_pose(tool.matrix())) return false;
-  const Pose next = nearest_pose(tool);
+  const detail::AskedPose read(tool);
+  if (!read.valid) return false;
+  const Pose& next = read.pose;
   if (next.matrix() == tool_.matrix()) return true;
   tool_ = next;
   with_tool_ = next.matrix() != Pose::Identity().matrix();
   if (guide_) guide_->set_tool(tool_);
   if (tracker_.q().size() == 0) return true;
   locate();
-  if (measured_) measured_tip_ = pose(chain_, tracker_.q() + following_error_) * tool_;
+  if (measured_) locate_measured();
   qdot_start_ = tracker_.qdot();
   fade_ = 0.0;
   expect_motion();

@@ -308,11 +308,12 @@ void ServoLoop::post(const Command& command) noexcept {
 
 // A tool comes with the command: no cycle follows the next command with the last tool.
 void ServoLoop::set_tool(const Pose& tool, LoopToken token) {
-  require(is_pose(tool.matrix()), "the tool's pose is not a pose");
+  const detail::AskedPose read(tool);
+  require(read.valid, "the tool's pose is not a pose");
   refuse_fork();
   const std::lock_guard lock(callers_);
   refuse_stranger(token);
-  posted_.tool = nearest_pose(tool);
+  posted_.tool = read.pose;
   ++posted_.tools;
   commands_.post(posted_);
 }

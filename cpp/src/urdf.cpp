@@ -141,8 +141,8 @@ void read_mimics(const std::vector<const TreeJoint*>& path, const Tree& tree, st
     const bool on_path = std::any_of(path.begin(), path.end(),
                                      [&mimic](const TreeJoint* joint) { return joint->name == mimic.joint; });
     if (!on_path) {
-      const auto [leader, is_first] = first.try_emplace(mimic.joint, segment.joint_name, mimic.multiplier,
-                                                        mimic.offset);
+      const Mimic own{segment.joint_name, mimic.multiplier, mimic.offset};
+      const auto [leader, is_first] = first.try_emplace(mimic.joint, own);
       if (is_first) {
         segment.notes.push_back(path[i]->label() + " mimics joint '" + mimic.joint +
                                 "', which is not between base and tip: it counts as a joint that moves by itself");

@@ -339,6 +339,7 @@ class Servo {
   void begin(const JointRef& posture) noexcept;
   // Pose and Jacobian of the tip, with the tool, at the reference.
   void locate() noexcept;
+  void locate_measured() noexcept;
   bool begin_cycle(std::optional<double> dt) noexcept;
   ServoStep stop(Status status) noexcept;
   ServoStep resolve(const Twist& twist, const Twist* feedforward, bool fade, const JointVector* goal) noexcept;
