@@ -18,6 +18,9 @@ constexpr double kFarthest = 1e9;  // [m]: differences of positions and their sq
 constexpr double kLatest = 1e12;   // [s]: differences of times keep their digits
 // A difference below this part of the way that max_speed goes in `smoothing` is done.
 constexpr double kDone = 0.01;
+// [s] that the clocks of a policy's machine and of the robot may differ: a stamp farther in the future, or a time so
+// far back, is of another clock.
+constexpr double kClocksDiffer = 1.0;
 
 void check(const char* what, double value, bool zero_allowed) {
   require(std::isfinite(value) && (value > 0.0 || (zero_allowed && value == 0.0)), what, " = ", value,
@@ -66,9 +69,16 @@ ActionChunks::ActionChunks(const ActionChunksOptions& options) : options_(option
 
 void ActionChunks::reset() noexcept {
   counts_ = {};
-  first_ = count_ = 0;
-  running_ = placed_ = timed_ = false;
+  placed_ = timed_ = false;
   last_ = {};
+  forget();
+}
+
+// No chunk is left; the target stays where it is.
+void ActionChunks::forget() noexcept {
+  first_ = count_ = 0;
+  running_ = false;
+  last_ = {.pose = last_.pose};
   acceleration_.setZero();
 }
 
@@ -94,6 +104,7 @@ ChunkStatus ActionChunks::judge(double stamp, std::size_t actions, std::size_t k
       actions > static_cast<std::size_t>(options_.max_actions)) {
     return refuse(ChunkStatus::Invalid);
   }
+  if (timed_ && stamp > time_ + kClocksDiffer) return refuse(ChunkStatus::Invalid);
   if (count_ > 0 && stamp <= newest_) return refuse(ChunkStatus::OutOfOrder);
   const double start = stamp + options_.first;
   const double span = static_cast<double>(knots - 1) * options_.dt_action;
@@ -252,7 +263,17 @@ ActionStatus ActionChunks::status(const Chunk& chunk, double time) const noexcep
 // Output -------------------------------------------------------------------------------------------------------------
 
 ActionTarget ActionChunks::at(double time) noexcept {
-  if (!std::isfinite(time) || (timed_ && time < time_)) return last_;
+  if (!std::isfinite(time) || (timed_ && time < time_ && time >= time_ - kClocksDiffer)) {
+    ActionTarget out = last_;  // a target that stays where it is does not move
+    out.twist.setZero();
+    return out;
+  }
+  if (timed_ && time < time_) {
+    forget();
+    timed_ = false;
+  }
+  // Before the first call nobody could tell that a stamp was of another clock.
+  if (!timed_ && count_ > 0 && newest_ > time + kClocksDiffer) forget();
   const double dt = timed_ ? time - time_ : 0.0;
   if (advance(time)) {
     const Chunk& newest = chunk(0);

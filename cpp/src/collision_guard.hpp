@@ -90,7 +90,7 @@ class CollisionGuard {
   Between between(const StopPath& path, double dt, const Look& from, const Look& to, int count) const noexcept;
   double dip(const BodyPair& pair, const JointVector& change, const JointVector& bend, double time) const noexcept;
   void look_ahead(const StopPath& path, double dt, int k, int count, Look& look) const noexcept;
-  void find_floors(const LimitTracker& tracker) noexcept;
+  void find_floors(const LimitTracker& tracker, int least_cycles) noexcept;
 
   std::shared_ptr<CollisionModel> model_;
   double gain_;

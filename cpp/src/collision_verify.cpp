@@ -11,14 +11,15 @@ bool CollisionGuard::shield(const LimitTracker& tracker, JointVector& qdot) noex
   const double dt = tracker.dt();
   if (floors_found_) std::fill(floor_.begin(), floor_.end(), model_->options.margin - kRounding);
   floors_found_ = false;
-  if (clear(StopPath(tracker, qdot), dt)) {
+  const StopPath path(tracker, qdot);
+  if (clear(path, dt)) {
     sure_ = !moving_;
     return false;
   }
   const JointVector stop = tracker.stop(), asked = qdot;
   if (!sure_) {  // the margin may be broken already, or the stop may break it
-    find_floors(tracker);
-    if (clear(StopPath(tracker, qdot), dt)) return false;
+    find_floors(tracker, path.cycles());
+    if (clear(path, dt)) return false;
   }
   double kept = 0.0, broken = 1.0;
   for (int i = 0; i < kBisections; ++i) {
@@ -125,12 +126,15 @@ double CollisionGuard::dip(const BodyPair& pair, const JointVector& change, cons
   return out + 0.125 * turn;
 }
 
-// The least distance that the stop leaves to each pair, where this is less than the margin.
-void CollisionGuard::find_floors(const LimitTracker& tracker) noexcept {
+// The least distance that the stop leaves to each pair, where this is less than the margin. The stop, and the rest
+// after it, last as long as the command's path: obstacles that move come nearer to an arm that rests, too, so that a
+// command which leads away leaves more.
+void CollisionGuard::find_floors(const LimitTracker& tracker, int least_cycles) noexcept {
   constexpr int kParts = 8;
   floors_found_ = true;
   const double dt = tracker.dt();
   const StopPath path(tracker, tracker.stop());
+  const int cycles = moving_ ? std::max(path.cycles(), least_cycles) : path.cycles();
   reach_now(&path);
   Travel travel;
   travels(path.reach(), travel);
@@ -140,7 +144,7 @@ void CollisionGuard::find_floors(const LimitTracker& tracker) noexcept {
     for (; from < count && listed < kListed; ++from) {
       const BodyPair& p = pair(from);
       double way = travel[static_cast<std::size_t>(p.body)][static_cast<std::size_t>(p.first)];
-      if (p.obstacle()) way += speed_[static_cast<std::size_t>(p.other - kMaxBodies)] * path.cycles() * dt;
+      if (p.obstacle()) way += speed_[static_cast<std::size_t>(p.other - kMaxBodies)] * cycles * dt;
       const double near = model_->options.margin + way;
       if (lower_[static_cast<std::size_t>(from)] >= near || exact(from) >= near) continue;
       listed_[static_cast<std::size_t>(listed++)] = from;
@@ -149,7 +153,7 @@ void CollisionGuard::find_floors(const LimitTracker& tracker) noexcept {
     look_ahead(path, dt, 0, listed, last);
     for (int part = 1; part <= kParts; ++part) {
       Look next;
-      const int k = path.cycles() * part / kParts;
+      const int k = cycles * part / kParts;
       if (k == last.k) continue;
       look_ahead(path, dt, k, listed, next);
       const JointVector change = next.q - last.q;

@@ -17,6 +17,10 @@ namespace sigmaik::detail {
 // either side the same reaches are taken, the elbow mirrored, as far as the joint's range goes. Where a position limit
 // cuts the range shortly beyond `straight`, an arm that folds to the short side stops at this limit, still stretched.
 struct Elbow {
+  // [rad] to `straight`: a servo keeps this far off, where the sign of the elbow's part of the Jacobian is certain. A
+  // reach of 1 m with equal links becomes 0.3 mm shorter.
+  static constexpr double kMargin = 0.05;
+
   int joint;        // 0 to n − 1
   double straight;  // [rad]
   bool above;       // the long side: angles above `straight`

@@ -191,7 +191,6 @@ void Guide::start_prediction(const Left& left, const Servo& servo, bool with_pos
   with_posture_ = with_posture;
   predictor_.guided_posture_ = with_posture ? goal_ : JointVector();
   predictor_.reset(servo.q(), servo.qdot());
-  predictor_.elbow_out_ = servo.elbow_out_;
   predictor_.nominal_ = servo.nominal_;
   predictor_.fade_ = servo.fade_;
   predicted_ = 0.0;

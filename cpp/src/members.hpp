@@ -300,7 +300,6 @@ struct Members<Servo> {
                                   &T::guided_posture_,
                                   made(&T::guide_),
                                   made(&T::elbow_),
-                                  &T::elbow_out_,
                                   made(&T::guard_)};  // verifies anew
   // The memory behind vectors of fewer joints than there is room for must hold numbers: reset() sees to this.
   static void prepare(T& servo) {

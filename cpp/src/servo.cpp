@@ -133,7 +133,6 @@ void Servo::begin(const JointRef& posture) noexcept {
   slowing_.reset();
   exact_spectrum_ = rest_spectrum_ = Spectrum{};
   locate();
-  watch_elbow(true);
   look_around(nullptr, 0.0);
   fade_ = 0.0;
   expect_motion();
@@ -250,6 +249,7 @@ ServoStep Servo::stop(Status status) noexcept {
   step.scale = 0.0;
   if (holds_tool_speed() && tracker_.q().size() != 0) hold_tool_speed(step);
   take(step, false);
+  if (fade_ < 1.0) qdot_start_ = tracker_.qdot();  // the next command starts from here
   return step;
 }
 
@@ -368,7 +368,6 @@ ServoStep Servo::resolve(const Twist& twist, const Twist* feedforward, bool fade
   }
   if (shield(solution.qdot, step)) rule = false;
   take(step, rule);
-  watch_elbow(goal != nullptr);
   return step;
 }
 

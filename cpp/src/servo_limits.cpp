@@ -73,43 +73,50 @@ void Servo::limit(ServoStep& step) noexcept {
   judge(asked, step);
 }
 
-// Whether the elbow is on its long side. `led`: the joints have gone their own way, to whichever side; otherwise an
-// elbow that was on the long side belongs there, though other joints' limits may have carried it a little beyond.
-void Servo::watch_elbow(bool led) noexcept {
+// [rad/s] ≥ 0, how fast the elbow may fold towards its short side; see Servo, the elbow's side.
+double Servo::folding_limit() const noexcept {
   const detail::Elbow* elbow = elbow_.operator->();
-  if (elbow == nullptr) return;
-  elbow_out_ = elbow->open(tracker_.q()[elbow->joint]) >= 0.0 || (elbow_out_ && !led);
+  const double open = elbow != nullptr ? elbow->open(tracker_.q()[elbow->joint]) : -1.0;
+  if (open < 0.0) return std::numeric_limits<double>::infinity();
+  return open > detail::Elbow::kMargin ? tracker_.heading_speed(elbow->joint, open - detail::Elbow::kMargin) : 0.0;
 }
 
-// Whether the elbow would fold to its short side, or could not be stopped before it; see Servo, the elbow's side.
 bool Servo::folds(const JointVector& qdot) const noexcept {
   const detail::Elbow* elbow = elbow_.operator->();
-  if (elbow == nullptr || !elbow_out_) return false;
-  const double open = elbow->open(tracker_.q()[elbow->joint]);
-  return elbow->open_rate(qdot[elbow->joint]) < -tracker_.heading_speed(elbow->joint, open);
+  return elbow != nullptr && -elbow->open_rate(qdot[elbow->joint]) > folding_limit();
 }
 
-// The heading bounds of the position limits, and of the elbow's side.
-VelocityBounds Servo::heading() const noexcept {
-  VelocityBounds out = tracker_.heading();
+// Puts the elbow's side into heading bounds.
+void Servo::keep_side(VelocityBounds& heading) const noexcept {
   const detail::Elbow* elbow = elbow_.operator->();
-  if (elbow == nullptr || !elbow_out_) return out;
+  if (elbow == nullptr) return;
   const int i = elbow->joint;
   const auto at = static_cast<std::size_t>(i);
-  const double most = tracker_.heading_speed(i, elbow->open(tracker_.q()[i]));
-  if (elbow->above && -most > out.lower[i]) {
-    out.lower[i] = std::min(-most, out.upper[i]);
-    out.lower_kind[at] = LimitKind::Position;
-  } else if (!elbow->above && most < out.upper[i]) {
-    out.upper[i] = std::max(most, out.lower[i]);
-    out.upper_kind[at] = LimitKind::Position;
+  const double most = folding_limit();
+  if (elbow->above && -most > heading.lower[i]) {
+    heading.lower[i] = std::min(-most, heading.upper[i]);
+    heading.lower_kind[at] = LimitKind::Position;
+  } else if (!elbow->above && most < heading.upper[i]) {
+    heading.upper[i] = std::max(most, heading.lower[i]);
+    heading.upper_kind[at] = LimitKind::Position;
   }
-  return out;
+}
+
+// The command without folding the elbow: other joints do as much of the twist as possible. A part of a command that
+// folds an elbow at its bound would be rest, for ever.
+JointVector Servo::unfolded(const JointVector& asked, ServoStep& step) noexcept {
+  VelocityBounds side;
+  side.upper.resize(chain_.dof());
+  for (int i = 0; i < chain_.dof(); ++i) side.upper[i] = tracker_.velocity_limit(i);
+  side.lower = -side.upper;
+  keep_side(side);
+  return redistribute(asked, side, step);
 }
 
 // Position limits: the command becomes a velocity inside the heading bounds, and inside the velocity limits still.
 void Servo::head(ServoStep& step) noexcept {
-  VelocityBounds heading = this->heading();
+  VelocityBounds heading = tracker_.heading();
+  keep_side(heading);
   const bool clear = clears(step.qdot);
   if (clear && heading.contain(step.qdot)) return;
   for (int i = 0; i < chain_.dof(); ++i) {
@@ -130,7 +137,8 @@ void Servo::head(ServoStep& step) noexcept {
     if (!clear || !clears(step.qdot)) head_clear(asked, heading, step);
   } else {
     const JointVector rest = JointVector::Zero(chain_.dof());
-    step.qdot = furthest(rest, asked, heading, step.limiting_joints);
+    const JointVector open = folds(asked) ? unfolded(asked, step) : asked;
+    step.qdot = furthest(rest, open, heading, step.limiting_joints);
     if (!clears(step.qdot)) head_clear(JointVector(step.qdot), heading, step);
   }
 }

@@ -324,6 +324,47 @@ TEST_CASE("chunks that cannot be used are refused, counted and change nothing") 
   CHECK_THROWS_AS(ActionChunks({.max_actions = 0}), Error);
 }
 
+TEST_CASE("stamps and times of another clock: refused or begun anew, the target stays, and later chunks are followed") {
+  const auto along_x = [](double from) {
+    Poses poses(8, Pose::Identity());
+    for (std::size_t i = 0; i < poses.size(); ++i) poses[i].translation()[0] = from + 0.03 * static_cast<double>(i);
+    return poses;
+  };
+  SUBCASE("a stamp of the future") {
+    ActionChunks chunks;
+    chunks.reset(Pose::Identity());
+    CHECK(chunks.push(3600.0, along_x(0.0)) == ChunkStatus::Accepted);  // nobody has told the time yet
+    CHECK(chunks.at(10.0).status == ActionStatus::Waiting);
+    CHECK(chunks.push(3600.0, along_x(0.0)) == ChunkStatus::Invalid);
+    CHECK(chunks.push(10.0, along_x(0.0)) == ChunkStatus::Accepted);
+    CHECK(chunks.at(10.1).status <= ActionStatus::Blending);
+    CHECK(chunks.push(10.9, along_x(0.0)) == ChunkStatus::Accepted);  // two clocks that differ a little
+  }
+  SUBCASE("a clock that goes back") {
+    for (const double back : {0.5, 2.0, 1000.0}) {
+      CAPTURE(back);
+      ActionChunks chunks;
+      chunks.reset(Pose::Identity());
+      chunks.at(5000.0);
+      REQUIRE(chunks.push(5000.0, along_x(0.0)) == ChunkStatus::Accepted);
+      ActionTarget last;
+      for (int k = 0; k < 400; ++k) last = chunks.at(5000.0 + 1e-3 * k);
+      REQUIRE(last.twist[0] > 0.2);
+      for (int k = 0; k < 300; ++k) {
+        const ActionTarget now = chunks.at(5000.4 - back + 1e-3 * k);
+        CHECK(now.twist == Twist::Zero());
+        CHECK(now.pose.matrix() == last.pose.matrix());
+        if (back > 1.0) CHECK(now.status == ActionStatus::Waiting);
+      }
+      if (back < 1.0) continue;
+      const double time = 5000.4 - back + 0.3;
+      CHECK(chunks.push(time, along_x(last.pose.translation()[0])) == ChunkStatus::Accepted);
+      for (int k = 0; k < 2000; ++k) last = chunks.at(time + 1e-3 * k);
+      CHECK(last.pose.translation()[0] == doctest::Approx(along_x(0.12).back().translation()[0]).epsilon(0.02));
+    }
+  }
+}
+
 #ifdef SIGMAIK_TEST_HEAP
 TEST_CASE("push and at use no heap") {
   Random random(6);

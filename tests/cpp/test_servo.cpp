@@ -15,6 +15,7 @@
 #include "methods.hpp"
 #include "numbers.hpp"
 #include "random.hpp"
+#include "settling.hpp"
 #include "twin.hpp"
 
 namespace {
@@ -316,6 +317,32 @@ TEST_CASE("soft start: the command of a pose target grows from zero, a twist com
     b.reset(start);
     const Twist twist = 0.1 * random.vector(6);
     for (int cycle = 0; cycle < 150; ++cycle) REQUIRE(same(a.update_twist(twist), b.update_twist(twist)));
+  }
+}
+
+TEST_CASE("after a stop a zero twist, or the tip's own pose, moves nothing, whatever the velocity of the start was") {
+  const Chain& chain = test::arms().at("ufactory_xarm7");
+  Random random(29);
+  for (int run = 0; run < 10; ++run) {
+    Servo servo(chain, JParse{});
+    servo.reset(test::start_of(random, chain, 0.6), random.vector(7));
+    if (run % 3 == 1) REQUIRE(servo.set_tool(random.pose()));
+    for (int k = 0; k < 2000; ++k) servo.hold();
+    if (run % 3 == 2) {
+      Servo next(chain, JParse{});
+      next.continue_from(servo);
+      servo = next;
+    }
+    const JointVector q = servo.q();
+    const Pose own = servo.tip();
+    for (int k = 0; k < 200; ++k) {
+      if (run % 2 == 0) {
+        servo.update_twist(Twist::Zero());
+      } else {
+        servo.update(own);
+      }
+    }
+    CHECK((servo.q() - q).cwiseAbs().maxCoeff() < 1e-9);
   }
 }
 

@@ -37,7 +37,8 @@ enum class ChunkStatus : std::int8_t {
   Accepted = 0,
   Expired = 1,     ///< refused: the time of its last action is over
   OutOfOrder = 2,  ///< refused: its stamp is not later than that of a chunk that was accepted
-  Invalid = 3,     ///< refused: not finite, not poses, empty, too long, or twists without a start
+  /// refused: not finite, not poses, empty, too long, twists without a start, or a stamp more than 1 s in the future
+  Invalid = 3,
 };
 
 /// Number of chunks with each status, and of actions.
@@ -121,8 +122,10 @@ class ActionChunks {
   /// chunk of poses before it. Real time.
   ChunkStatus push_twists(double stamp, std::span<const Twist> twists) noexcept;
 
-  /// The target at `time` [s]. If `time` is before that of the last call, or not finite, the answer is the last target.
-  /// Real time.
+  /// The target at `time` [s]. If `time` is before that of the last call, or not finite, the answer is the last target
+  /// without its twist. A clock that was set back by more than 1 s starts anew: chunks of the old clock are forgotten,
+  /// and the target stays where it is, ActionStatus::Waiting, until a chunk of the new clock comes. A chunk that came
+  /// before the first call and has a stamp more than 1 s after it is forgotten, too. Real time.
   ActionTarget at(double time) noexcept;
 
   /// The settings, as given.
@@ -131,6 +134,7 @@ class ActionChunks {
   const ChunkCounts& counts() const noexcept { return counts_; }
 
  private:
+  void forget() noexcept;
   using Motion = detail::PoseMotion;
   // The actions of a chunk as a motion; `count` of the knots are used.
   struct Chunk {

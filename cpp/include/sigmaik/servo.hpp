@@ -208,9 +208,9 @@ struct ServoStep {
 /// *The elbow's side.* The straight elbow is a singularity with the same reaches on either side. On some arms (Panda,
 /// xArm7, Comau Racer) a position limit leaves less than half as much on one side as on the other: an arm that folds to
 /// this short side, on its way back from the edge of its reach, stays stretched out at the limit. A guided servo keeps
-/// the elbow on the long side: the straight angle is a heading bound, like a position limit, for pose targets and for
-/// twists. An elbow on the short side, where it has started or where the guide has led it, is free until it leaves
-/// this side.
+/// the elbow on the long side: 0.05 rad before the straight angle is a heading bound, like a position limit, for pose
+/// targets and for twists; a reach of 1 m becomes 0.3 mm shorter. An elbow on the short side, where it
+/// has started or where the guide has led it, is free until it leaves this side.
 ///
 /// *Time of a cycle.* update(), update_twist() and hold() take the time since the last call on the robot's clock, in
 /// [kShortestCycle, kLongestCycle] times options().dt; options().dt where no time is given. A program that loses a
@@ -370,9 +370,10 @@ class Servo {
 
   // servo_limits.cpp
   void limit(ServoStep& step) noexcept;
-  void watch_elbow(bool led) noexcept;
   bool folds(const JointVector& qdot) const noexcept;
-  VelocityBounds heading() const noexcept;
+  double folding_limit() const noexcept;
+  void keep_side(VelocityBounds& heading) const noexcept;
+  JointVector unfolded(const JointVector& asked, ServoStep& step) noexcept;
   void head(ServoStep& step) noexcept;
   void approach(ServoStep& step, bool redistributes) noexcept;
   void lead(const JointVector& goal, ServoStep& step) noexcept;
@@ -428,7 +429,6 @@ class Servo {
   JointVector guided_posture_;                   // the posture that the guide has given; empty: none
   detail::Owner<detail::Guide> guide_;           // null: not guided
   detail::Owner<detail::Elbow> elbow_;           // null: may fold to either side
-  bool elbow_out_ = false;                       // the elbow is on its long side, to stay there
   detail::Owner<detail::CollisionGuard> guard_;  // null: nothing is checked
 };
 
