@@ -48,6 +48,7 @@ std::string source_argument(const py::object& object);
 struct Text {
   std::string value;
   operator const std::string&() const noexcept { return value; }
+  bool operator<(const Text& other) const noexcept { return value < other.value; }
 };
 
 /// Throws unless every entry is finite.

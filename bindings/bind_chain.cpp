@@ -219,7 +219,10 @@ void bind_parts(py::class_<Chain>& cls) {
           "pose: (4, 4), the tool's frame in the tip.\n"
           "inertia: Inertia of the tool, in the tool's frame; Dynamics uses it. None: not known.")
       .def(
-          "lock", [](const Chain& c, const std::map<std::string, double>& positions) { return c.lock(positions); },
+          "lock",
+          [](const Chain& c, const std::map<Text, double>& positions) {
+            return c.lock({positions.begin(), positions.end()});
+          },
           py::arg("positions"),
           "The same arm with joints that do not move any more: {name: position [rad or m]}. q has fewer entries.\n\n"
           "Links and inertias stay. Raises Error where a name is not in joint_names, a position is outside its "

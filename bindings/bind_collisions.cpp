@@ -170,7 +170,7 @@ void bind_obstacle(py::module_& m) {
 
 CollisionOptions options_of(bool self_collision, double margin, const py::object& source, const py::object& srdf,
                             double radius, std::optional<int> capsules,
-                            const std::vector<std::pair<std::string, std::string>>& ignore) {
+                            const std::vector<std::pair<Text, Text>>& ignore) {
   CollisionOptions options;
   options.margin = margin;
   options.self_collision = self_collision;
@@ -179,14 +179,14 @@ CollisionOptions options_of(bool self_collision, double margin, const py::object
   options.radius = radius;
   options.capsules = capsules.value_or(0);
   if (capsules && *capsules < 1) throw Error("capsules = " + std::to_string(*capsules) + " must be above 0");
-  options.ignore = ignore;
+  options.ignore.assign(ignore.begin(), ignore.end());
   return options;
 }
 
 void bind_setup(py::class_<Collisions>& c) {
   c.def(py::init([](const Chain& chain, const py::object& obstacles, bool self_collision, double margin,
                     const py::object& source, const py::object& srdf, double radius, std::optional<int> capsules,
-                    const std::vector<std::pair<std::string, std::string>>& ignore,
+                    const std::vector<std::pair<Text, Text>>& ignore,
                     const std::optional<std::vector<LinkCapsule>>& arm) {
           const CollisionOptions options = options_of(self_collision, margin, source, srdf, radius, capsules, ignore);
           const std::vector<Obstacle> world = obstacles_argument(obstacles);
@@ -194,8 +194,7 @@ void bind_setup(py::class_<Collisions>& c) {
         }),
         py::arg("chain"), py::arg("obstacles") = py::none(), py::arg("self_collision") = true, py::arg("margin") = 0.01,
         py::kw_only(), py::arg("source") = py::none(), py::arg("srdf") = py::none(), py::arg("radius") = 0.05,
-        py::arg("capsules") = py::none(), py::arg("ignore") = std::vector<std::pair<std::string, std::string>>{},
-        py::arg("arm") = py::none(),
+        py::arg("capsules") = py::none(), py::arg("ignore") = py::list(), py::arg("arm") = py::none(),
         "obstacles: up to 32 of Obstacle, or of the shapes Box, Sphere, Cylinder of sigmaik.planning, or an Obstacles "
         "of\n"
         "    these; None: none.\n"

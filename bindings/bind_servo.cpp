@@ -207,12 +207,11 @@ void bind_cycle(py::class_<Servo>& c) {
        "    strict=True of the servo it raises Error, as arguments of a wrong shape or with NaN do in any case.")
       .def(
           "update_twist",
-          [](Servo& s, const ArrayLike& twist, const std::string& frame, const MaybeArray& point,
-             std::optional<double> dt) {
+          [](Servo& s, const ArrayLike& twist, const Text& frame, const MaybeArray& point, std::optional<double> dt) {
             require_started(s);
             const std::optional<double> time = cycle_argument(s, dt);
             const Twist asked = twist_argument(twist, "twist");
-            if (frame == "base" && !point) return checked(s.update_twist(asked, time));
+            if (frame.value == "base" && !point) return checked(s.update_twist(asked, time));
             const Frame axes = task_argument(py::none(), frame).frame;
             const Eigen::Vector3d at = point                 ? vector_argument(*point, "point")
                                        : axes == Frame::Tool ? Eigen::Vector3d(Eigen::Vector3d::Zero())
@@ -226,7 +225,7 @@ void bind_cycle(py::class_<Servo>& c) {
           "origin.\n"
           "dt: [s] the time since the last call, as for `update`.")
       .def_property_readonly("rough_targets", &Servo::rough_targets,
-                             "Targets of update() whose rotation was off by more than rounding (up to 5e-4 in RᵀR), "
+                             "Targets of update() whose rotation was off by more than rounding (up to 1e-3 in RᵀR), "
                              "and was made one.")
       .def(
           "set_tool",

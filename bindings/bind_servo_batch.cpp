@@ -156,7 +156,7 @@ void bind_calls(py::class_<GuardedBatch>& c) {
           "Arrays of float64 in C order are read where they are; others are copied first.")
       .def(
           "update_twist",
-          [](GuardedBatch& self, const ArrayLike& twists, const std::string& frame) -> GuardedBatch& {
+          [](GuardedBatch& self, const ArrayLike& twists, const Text& frame) -> GuardedBatch& {
             require_started(self, self.batch());
             const Array asked = rows_of(twists, "twists", {self.size(), 6});
             const Frame axes = task_argument(py::none(), frame).frame;

@@ -297,11 +297,13 @@ void bind_safety(py::class_<ServoLoop>& c) {
 }
 
 void bind_owner(py::class_<ServoLoop>& c) {
-  c.def("take", &ServoLoop::take, py::arg("name"), py::arg("take_over") = false,
-        "Makes the caller the arm's owner; a live command is forgotten.\n\n"
-        "Until give_back(), follow(), follow_twist(), configure() and release() need the token that is returned; "
-        "anyone may\n"
-        "stop(), halt() and hold() the arm. Raises Error where the arm has an owner, unless it is taken over.")
+  c.def(
+       "take", [](ServoLoop& loop, const Text& name, bool take_over) { return loop.take(name, take_over); },
+       py::arg("name"), py::arg("take_over") = false,
+       "Makes the caller the arm's owner; a live command is forgotten.\n\n"
+       "Until give_back(), follow(), follow_twist(), configure() and release() need the token that is returned; "
+       "anyone may\n"
+       "stop(), halt() and hold() the arm. Raises Error where the arm has an owner, unless it is taken over.")
       .def("give_back", &ServoLoop::give_back, py::arg("token"),
            "Gives the arm back, and stops it. Returns False where the token is not the owner's, and changes nothing.")
       .def_property_readonly("owner", &ServoLoop::owner, "The owner's name; '' where nobody owns the arm.");

@@ -14,13 +14,13 @@ namespace {
 
 using detail::kInfinity;
 using namespace detail::constrained;
-constexpr double kMissed = 0.25;    // part of the exact rows' change from which on the joints go in proportion
-constexpr double kCalming = 0.05;   // [s] of swinging that divides the patience by e
-constexpr double kPatience = 0.02;  // a smaller patience is none
-constexpr double kJump = 0.5;       // part of the joints' bounds; a larger change of the target's motion is a jump
-constexpr double kLarge = 0.1;      // [rad, m] an error of the approximate rows that needs an arrival
-constexpr double kFade = 1.0;       // [s] time constant of a motion's end after the settling time
-constexpr int kTurns = 2;           // times that the closing motion may turn against the arm before it is calmed
+constexpr double kMissed = 0.25;   // part of the exact rows' change from which on the joints go in proportion
+constexpr double kCalming = 0.05;  // [s] in which the patience comes back by 1 − 1/e where the target moves
+constexpr double kLess = 0.7;      // of the closing speed stays at each further turn
+constexpr double kJump = 0.5;      // part of the joints' bounds; a larger change of the target's motion is a jump
+constexpr double kLarge = 0.1;     // [rad, m] an error of the approximate rows that needs an arrival
+constexpr double kFade = 1.0;      // [s] time constant of a motion's end after the settling time
+constexpr int kTurns = 2;          // times that the closing motion may turn against the arm before it is calmed
 
 }  // namespace
 
@@ -98,8 +98,7 @@ ConstrainedIk::Closing ConstrainedIk::close(bool still) noexcept {
   for (int j = 0; j < n; ++j) change += solution.x[j] * at.slope.col(j);
   out.qdot = solution.x.head(n) / options_.dt;
   calm(out.qdot, still);
-  const double patience = std::max(0.0, (patience_ - kPatience) / (1.0 - kPatience));
-  const double brake = patience * tracker_.arrival(out.qdot, part / options_.dt);
+  const double brake = patience_ * tracker_.arrival(out.qdot, part / options_.dt);
   // An error so small that one cycle can both make it up and stop again needs no decay.
   const VelocityBounds& bounds = tracker_.bounds();
   for (int i = 0; i < n; ++i) {
@@ -107,7 +106,7 @@ ConstrainedIk::Closing ConstrainedIk::close(bool still) noexcept {
     if (size > out.size * width) out.size = width > 0.0 ? size / width : kInfinity;
   }
   out.small = out.size <= part;
-  const double once = std::min(patience / part, 1.0 / out.size);
+  const double once = std::min(patience_ / part, 1.0 / out.size);
   out.size *= brake;
   out.qdot *= brake;
   out.approximate = brake * change;
@@ -117,7 +116,8 @@ ConstrainedIk::Closing ConstrainedIk::close(bool still) noexcept {
 
 // At the edge of the reach, and where the approximate rows cannot be met together with the exact ones, the way that a
 // linearisation shows is too long, and the arm would swing about a resting target. So each time that the closing motion
-// turns against the arm, more than twice, its speed is cut; it comes back when the target moves.
+// turns against the arm, more than twice, a part of its speed stays; all of it comes back when the target moves. The
+// speed never vanishes, so that a target within reach is still approached.
 void ConstrainedIk::calm(const JointVector& wanted, bool still) noexcept {
   const double part = std::min(0.5, options_.dt / kCalming);
   const double along = tracker_.qdot().dot(wanted);
@@ -125,11 +125,9 @@ void ConstrainedIk::calm(const JointVector& wanted, bool still) noexcept {
   if (!still) {
     patience_ += part * (1.0 - patience_);
     turns_ = 0;
-  } else if (against && !against_) {
-    turns_ = std::min(turns_ + 1, kTurns);
-  }
-  if (still && against && turns_ >= kTurns) {
-    patience_ *= 1.0 + part * along / (tracker_.qdot().norm() * wanted.norm());
+  } else if (against && !against_ && ++turns_ > kTurns) {
+    patience_ *= kLess;
+    turns_ = kTurns;
   }
   against_ = against;
 }

@@ -244,3 +244,22 @@ TEST_CASE("a matrix that is a rotation but for rounding becomes the nearest rota
   }
   CHECK(rough > 1000);
 }
+
+TEST_CASE("a quaternion whose length is off by 1e-4 gives a pose, by the homogeneous formula and by the usual one") {
+  Random random(19);
+  for (int i = 0; i < 5000; ++i) {
+    const Eigen::Vector3d v = random.unit(4).head<3>();
+    Eigen::Quaterniond q(random.pose().linear());
+    q.coeffs() *= 1.0 + 1e-4 * (i % 2 == 0 ? 1.0 : random.uniform(-1.0, 1.0));
+    const double x = q.x(), y = q.y(), z = q.z(), w = q.w();
+    Eigen::Matrix4d usual = Eigen::Matrix4d::Identity(), homogeneous = usual;
+    usual.topLeftCorner<3, 3>() << 1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y),  //
+        2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x),                             //
+        2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y);
+    homogeneous.topLeftCorner<3, 3>() = usual.topLeftCorner<3, 3>();
+    homogeneous.topLeftCorner<3, 3>().diagonal().array() += q.squaredNorm() - 1.0;
+    usual.topRightCorner<3, 1>() = v;
+    CHECK(sigmaik::is_pose(usual));
+    CHECK(sigmaik::is_pose(homogeneous));
+  }
+}

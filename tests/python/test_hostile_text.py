@@ -12,6 +12,12 @@ from sigmaik.teleop import Session
 LONE = ("\ud800", "a\udfffb", "\udc80")
 
 
+def started():
+    servo = sk.Servo(sk.robots.load("ur10"))
+    servo.reset(sk.robots.home("ur10"))
+    return servo
+
+
 @pytest.mark.parametrize("text", LONE, ids=ascii)
 @pytest.mark.parametrize(
     "call",
@@ -28,6 +34,10 @@ LONE = ("\ud800", "a\udfffb", "\udc80")
         lambda text: sk.singularities.load(text),
         lambda text: sk.planning.arm_spheres(sk.robots.load("ur10"), text),
         lambda text: sk.methods.parse(text),
+        lambda text: sk.robots.load("ur10").lock({text: 0.0}),
+        lambda text: sk.Collisions(sk.robots.load("ur10"), ignore=[(text, "wrist_3_link")]),
+        lambda text: sk.ServoLoop(started()).take(text),
+        lambda text: started().update_twist(np.zeros(6), frame=text),
         lambda text: sk.robots.load(text),
         lambda text: sk.robots.open(text),
         lambda text: Session(text),

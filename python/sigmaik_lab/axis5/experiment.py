@@ -169,9 +169,8 @@ def motion(
     for name, value in (("distance", distance), ("duration", duration)):
         if not 0.0 < value < math.inf:
             raise ValueError(f"{name} must be positive and finite, not {value:g}")
-    least = 1e-6 if first else 0.0
-    if not least <= offset <= 0.5:
-        raise ValueError(f"offset must be from {math.degrees(least):.0e}° to {math.degrees(0.5):.1f}°")
+    if not 0.0 <= offset <= 0.5:
+        raise ValueError(f"offset must be from 0° to {math.degrees(0.5):.1f}°")
 
     chain = sk.robots.load(ROBOT)
     q = np.radians(_CLOSE_BY if first else _ACROSS)

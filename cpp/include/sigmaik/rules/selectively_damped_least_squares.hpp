@@ -13,6 +13,9 @@ namespace sigmaik {
 /// the paper's angle limit per update γ_max is a joint speed here. There is one end effector, whose twist counts as one
 /// target. Directions with σ_i ≤ 1e-12 σ_max are dropped. Where singular values are equal, the answer depends on the
 /// basis chosen, as in the paper.
+///
+/// The clamp also lowers the gain near a target, in directions in which the joints move more than the tip does. A pose
+/// takes longer than with the other rules: of near targets about one in twenty is still 1 to 4 mm off after 4 s.
 struct SelectivelyDampedLeastSquares {
   double max_speed = 0.7853981633974483;  ///< [rad/s] > 0: no joint is asked for more
 
