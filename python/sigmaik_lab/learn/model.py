@@ -190,9 +190,9 @@ def _add_cup(world: Any) -> None:
 
 
 def _add_view(task: Task, spec: Any) -> None:
-    """A light, and a camera that sees both discs and the arm between them."""
-    look = 0.5 * (task.cup + task.goal)
-    eye = look + task.reach * np.array([0.35, -1.25, 0.75])
+    """A light, and a camera that sees both discs and the arm."""
+    look = (task.cup + task.goal + np.array([0.0, 0.0, 0.4 * task.reach])) / 3.0
+    eye = look + task.reach * np.array([0.4, -1.5, 0.8])
     back = (eye - look) / np.linalg.norm(eye - look)
     right = np.cross([0.0, 0.0, 1.0], back)
     right /= np.linalg.norm(right)
