@@ -72,6 +72,12 @@ class Writer:
         """Number of episodes, those of the data set and those that were added since."""
         return self._total("episodes") + len(self._rows)
 
+    def scenes(self) -> list[dict[str, Any]]:
+        """The scenes of all episodes, those that wait included."""
+        files = sorted(self.path.glob("meta/episodes/*/*.parquet"))
+        rows = [row for file in files for row in _read(file).to_pylist()] + self._rows
+        return [json.loads(row["scene"]) for row in rows]
+
     def add(self, episode: Episode) -> None:
         """Adds an episode, on disk when the call returns. Error where its shapes, numbers or times do not fit."""
         number, first = len(self), self._total("frames") + sum(row["length"] for row in self._rows)
