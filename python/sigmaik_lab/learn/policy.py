@@ -33,7 +33,7 @@ _LEAST = 1e-3
 class Shape:
     """What fixes a policy's network and noise levels."""
 
-    horizon: int = 16  #: actions of a chunk
+    horizon: int = 8  #: actions of a chunk
     channels: tuple[int, ...] = (64, 128)  #: of the U-Net's levels
     hidden: int = 128
     levels: int = 100  #: of noise
