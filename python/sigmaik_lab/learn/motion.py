@@ -7,7 +7,7 @@ import numpy as np
 import sigmaik as sk
 from sigmaik._types import Array
 
-__all__ = ["along", "difference", "rotation_vectors", "rotations", "shorten"]
+__all__ = ["along", "difference", "moved", "rotation_vectors", "rotations", "shorten"]
 
 
 def rotation_vectors(rotation: Array) -> Array:
@@ -48,9 +48,14 @@ def difference(start: Array, end: Array) -> Array:
 
 def along(start: Array, way: Array) -> Array:
     """(…, 4, 4) the poses at the end of a way (…, 6) from `start`: the inverse of `difference`."""
+    return moved(start, way[..., :3], rotations(way[..., 3:]))
+
+
+def moved(start: Array, shift: Array, turn: Array) -> Array:
+    """(…, 4, 4) poses (…, 4, 4) that are shifted by (…, 3) and turned by rotations (…, 3, 3), both in base axes."""
     pose = start.copy()
-    pose[..., :3, 3] += way[..., :3]
-    pose[..., :3, :3] = rotations(way[..., 3:]) @ start[..., :3, :3]
+    pose[..., :3, 3] += shift
+    pose[..., :3, :3] = turn @ start[..., :3, :3]
     return pose
 
 

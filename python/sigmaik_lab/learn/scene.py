@@ -21,8 +21,9 @@ REGIONS: tuple[Region, ...] = ("edge", "overhead")
 _ASSUMED_ACCELERATION = 10.0
 #: [m] radius of the discs in which cups and goals are drawn, as in the paper.
 _SPREAD = 0.05
-#: [m] the farthest cup is this much inside the end of reach.
-_INSIDE = 0.008
+#: [m] the cups' disc has its centre this much inside the end of reach; a cup that is drawn nearer to the end than the
+#: second length, or farther from the end than the third one, is drawn again: the arm is singular for all cups.
+_INSIDE, _LEAST_INSIDE, _MOST_INSIDE = 0.01, 0.003, 0.017
 #: [m] from one pose to the next on the way to the end of reach, and at the end of the search.
 _COARSE, _FINE = 0.02, 1e-4
 #: [rad or m] by which a joint may differ from one pose to the next.
@@ -37,6 +38,11 @@ _SHELF = 0.02
 _GOAL_AZIMUTH, _GOAL_PARTS = 1.0, (0.5, 0.55, 0.6, 0.65, 0.7)
 #: Distances from axis 1, as parts of the lengths of all links together, at which the search begins.
 _STARTS = (0.35, 0.45, 0.55)
+#: Distance of the first pose of an episode from axis 1, as a part of the reach.
+_START = 0.65
+#: [s] a cycle of the servo that tries whether the arm can do the task, its cycles for each part, and [m] the error at
+#: which the servo has arrived.
+_CYCLE, _CYCLES, _ARRIVED = 0.01, 1000, 0.003
 #: [m] by which a cup is lifted, which must be possible at the goal.
 _LIFT = 0.08
 
@@ -107,7 +113,7 @@ class Task:
 
     def draw(self, rng: np.random.Generator, options: dict[str, Any] | None = None) -> Draw:
         """Draws an episode. options: "cup" and "goal" (3,) take the place of what is drawn. ValueError for others."""
-        drawn = {"cup": self.cup + _in_disc(rng), "goal": self.goal + _in_disc(rng)}
+        drawn = {"cup": self._reachable_cup(rng), "goal": self.goal + _in_disc(rng)}
         start = self.start + np.clip(rng.normal(0.0, 0.01, self.chain.dof), -0.02, 0.02)
         limits = self.chain.limits
         start = np.clip(start, limits.lower, limits.upper)
@@ -116,6 +122,12 @@ class Task:
                 raise ValueError(f"a scene has no option '{name}'; there are {', '.join(drawn)}")
             drawn[name] = np.array(value, dtype=np.float64).reshape(3)
         return Draw(drawn["cup"], drawn["goal"], start)
+
+    def _reachable_cup(self, rng: np.random.Generator) -> Array:
+        while True:
+            cup = self.cup + _in_disc(rng)
+            if _LEAST_INSIDE <= self.reach - np.hypot(cup[0], cup[1]) <= _MOST_INSIDE:
+                return cup
 
 
 def _in_disc(rng: np.random.Generator) -> Array:
@@ -170,8 +182,26 @@ def _place(task: Task) -> Task | None:
         goal = np.array([away * np.cos(_GOAL_AZIMUTH), away * np.sin(_GOAL_AZIMUTH), low])
         corners = [goal + [_SPREAD * x, _SPREAD * y, z] for x, y, z in ((1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, _LIFT))]
         if all(ik.solve(task.hold(p), near=task.start).status == sk.PositionIkStatus.OK for p in corners):
-            return dataclasses.replace(task, goal=goal)
+            placed = dataclasses.replace(task, goal=goal)
+            if _servo_arrives(placed):
+                return placed
     return None
+
+
+def _servo_arrives(task: Task) -> bool:
+    """Whether the library's default servo comes from the start to the cup, and with the cup to the goal."""
+    servo = sk.Servo(task.chain, None, _CYCLE)
+    servo.reset(task.start)
+    up = np.array([0.0, 0.0, _LIFT])
+    for point in (task.cup, task.goal + up, task.goal):
+        target = task.hold(point)
+        for _ in range(_CYCLES):
+            error = servo.update(target).pose_error
+            if np.linalg.norm(error[:3]) < _ARRIVED:
+                break
+        else:
+            return False
+    return True
 
 
 def _shoulder(chain: sk.Chain) -> float:
@@ -207,5 +237,8 @@ def _end_of_reach(task: Task, height: float, span: float) -> Task | None:
             distance, q = distance + step, np.array(solved.q)
         else:
             step *= 0.5
-    cup = np.array([distance - _INSIDE - _SPREAD, 0.0, height])
-    return dataclasses.replace(posed, cup=cup, reach=distance)
+    cup = np.array([distance - _INSIDE, 0.0, height])
+    before = ik.solve(posed.hold(np.array([_START * distance, 0.0, height + _LIFT])), near=start)
+    if before.status == sk.PositionIkStatus.OK:
+        start = np.array(before.q)
+    return dataclasses.replace(posed, start=start, cup=cup, reach=distance)

@@ -156,15 +156,18 @@ class World:
         for q in path[each - 1 :: each]:
             pose = self.task.chain.pose(q)
             wanted = self.opening + np.clip(command - self.opening, -travel, travel)
-            inside = self._between(pose) & ~self.lost
-            closes = (wanted <= self._grasped) & (self.opening >= self._grasped) & inside & ~self.held
-            self._take(pose, closes)
-            self.held |= closes
+            closes = (wanted <= self._grasped) & (self.opening >= self._grasped) & ~self.held & ~self.lost
+            if closes.any():
+                closes &= self._between(pose)
+                self._take(pose, closes)
+                self.held |= closes
             self.opening = np.where(self.held, np.maximum(wanted, self._grasped), wanted)
-            self._carry(pose)
+            if self.held.any():
+                self._carry(pose)
             opens = self.held & (self.opening > self._grasped + _LET_GO)
-            self.held &= ~opens
-            self._let_go(pose, opens)
+            if opens.any():
+                self.held &= ~opens
+                self._let_go(pose, opens)
         return path[-1].copy(), (path[-1] - path[-2]) / self.drive.dt
 
     def _between(self, pose: Array) -> Array:
