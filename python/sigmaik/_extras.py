@@ -12,6 +12,7 @@ __all__ = ["MissingPackage", "installed", "need"]
 _REQUIREMENTS = {
     "distributed": "'dask[distributed]'",
     "mujoco": "'mujoco>=3'",
+    "PIL": "pillow",
     "optik": "optik-py",
     "placo": "'placo>=0.10'",
     "rclpy": "ros-rclpy ros-rmw-fastrtps-cpp ros-diagnostic-msgs ros-geometry-msgs ros-sensor-msgs ros-std-srvs "
