@@ -25,8 +25,9 @@ __all__ = ["STEADY", "Demonstrator", "Hand"]
 _HOLDS = 2.0 * CUP.radius / GRIPPER.stroke
 #: [m] of the point before the cup, and beside whose axis the tool goes ahead.
 _BEFORE, _BESIDE = 0.09, 0.008
-#: [m] within which the tool is at the cup, along and across, and beyond which an open gripper still closes.
-_AT, _AWAY = 0.006, 0.012
+#: [m] within which the tool is at the cup, along and across, so that the gripper closes, and within which a gripper
+#: that is as wide as the cup has the cup.
+_AT, _KEEP = 0.006, 0.02
 #: [m] by which a cup is lifted on its way, and the horizontal distance from the goal at which it goes down.
 _LIFT, _DOWN = 0.06, 0.01
 #: [m] above its shelf from which a cup is carried away.
@@ -104,14 +105,13 @@ class Demonstrator:
         turned = float(np.linalg.norm(difference(pose, hold)[3:]))
         if (
             np.linalg.norm((cup - goal)[:2]) < 0.8 * AT_GOAL
-            and abs(cup[2] - goal[2]) < 1e-4
+            and abs(cup[2] - goal[2]) < _LET_GO
             and opening > _HOLDS + 0.03
         ):
             return self._back(pose, hold), 1.0, False  # done
-        at_cup = abs(off[2]) < _AWAY and across < _AWAY
-        if at_cup and opening < _HOLDS + 0.015:
+        if max(abs(off[2]), across) < _KEEP and _HOLDS - 0.015 < opening < _HOLDS + 0.015:
             return self._carry(pose, cup, goal)
-        if at_cup and abs(off[2]) < _AT and across < _AT:
+        if max(abs(off[2]), across) < _AT and opening > _HOLDS:
             return hold, 0.0, True
         if opening < 0.95:
             # Closed on nothing, or not yet open: away from the cup, and open.
