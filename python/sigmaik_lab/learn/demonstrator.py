@@ -19,7 +19,7 @@ from .motion import difference, rotations, shorten
 from .scene import CUP, GRIPPER, Task
 from .world import AT_GOAL
 
-__all__ = ["Demonstrator", "Hand"]
+__all__ = ["STEADY", "Demonstrator", "Hand"]
 
 #: Opening of a gripper that holds the cup.
 _HOLDS = 2.0 * CUP.radius / GRIPPER.stroke
@@ -29,6 +29,8 @@ _BEFORE, _BESIDE = 0.09, 0.008
 _AT, _AWAY = 0.006, 0.012
 #: [m] by which a cup is lifted on its way, and the horizontal distance from the goal at which it goes down.
 _LIFT, _DOWN = 0.06, 0.01
+#: [m] above its shelf from which a cup is carried away.
+_CLEAR = 0.02
 #: [m] above its place at which a cup is let go.
 _LET_GO = 0.006
 #: [rad] of rotation within which the tool goes ahead.
@@ -124,6 +126,13 @@ class Demonstrator:
         above = float(cup[2] - goal[2])
         if over < 0.5 * AT_GOAL and above < _LET_GO:
             return pose, 1.0, True
+        stands = float(self._task.support(cup)) + 0.5 * CUP.height
+        if over > 0.15 and cup[2] - stands < _CLEAR:
+            # Up and back at once: straight up may be out of reach.
+            outwards = np.array([cup[0], cup[1], 0.0]) / max(float(np.hypot(cup[0], cup[1])), 1e-9)
+            target = self._task.hold(cup + np.array([0.0, 0.0, _LIFT]) - _LIFT * outwards)
+            target[:3, 3] += pose[:3, 3] - cup
+            return target, 0.0, False
         there = goal.copy()
         low = over < _DOWN or (above < _LIFT and over < 2.0 * _DOWN)
         if not low:

@@ -12,6 +12,7 @@ from sigmaik._extras import need
 
 from .drives import make_drive
 from .episode import FPS, Action
+from .opengl import choose_opengl
 from .scene import Region, task
 from .spaces import IMAGE, action_space, information, one, state_space
 from .world import World
@@ -69,6 +70,7 @@ class Fetch(gymnasium.Env[Observation, NDArray[np.float32]]):
             raise ValueError(f"render_mode is None or 'rgb_array', not '{render_mode}'")
         if image or render_mode or physics == "mujoco":
             need("mujoco")
+            choose_opengl()
         self.task = task(robot, region)
         self.render_mode, self.rule, self._max_steps, self._image = render_mode, rule, max_steps, image
         drive = make_drive(self.task.chain, rule, dt, 1, 1)

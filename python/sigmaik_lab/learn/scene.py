@@ -55,6 +55,7 @@ class Gripper:
     length: float = 0.17  #: [m] from the flange to the tool's origin
     stroke: float = 0.085  #: [m] between the fingertips of an open gripper
     speed: float = 2.0  #: [1/s] of the opening
+    mass: float = 0.8  #: [kg]
     depth: float = 0.015  #: [m] along z within which the fingers meet the middle of the cup
     height: float = 0.035  #: [m] along x, likewise
 
@@ -155,7 +156,9 @@ def task(robot: str, region: Region = "edge") -> Task:
     arm = sk.robots.open(robot)
     place = np.eye(4)
     place[2, 3] = GRIPPER.length
-    chain = arm.chain.with_tool(place)
+    # A block of the gripper's size, half its length behind the fingertips.
+    tensor = GRIPPER.mass / 12.0 * np.diag([0.03, 0.03, 0.02])
+    chain = arm.chain.with_tool(place, sk.Inertia(GRIPPER.mass, [0.0, 0.0, -0.5 * GRIPPER.length], tensor))
     limits = chain.limits
     chain = chain.with_limits(
         acceleration=np.where(np.isfinite(limits.acceleration), limits.acceleration, _ASSUMED_ACCELERATION)

@@ -62,6 +62,7 @@ class World:
         self.sigma = np.zeros(size)
         self.opening = np.ones(size)
         self.cup, self.goal, self._offset = np.zeros((size, 3)), np.zeros((size, 3)), np.zeros((size, 3))
+        self.cup_quaternion_wxyz = np.tile([1.0, 0.0, 0.0, 0.0], (size, 1))
         self.held, self.lost, self.placed = (np.zeros(size, dtype=bool) for _ in range(3))
         self.reached = np.full(size, -1)  #: the furthest phase, an index of PHASES; −1: none
         self.limits = LimitCounts(*(np.zeros(size, dtype=np.int64) for _ in range(3)))
