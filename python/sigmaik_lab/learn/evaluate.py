@@ -39,6 +39,9 @@ def options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--region", choices=REGIONS, default="edge", help="(%(default)s)")
     parser.add_argument("--execute", type=int, default=4, metavar="N", help="actions of a chunk (%(default)s)")
     parser.add_argument("--denoise", type=int, default=10, metavar="N", help="steps of DDIM (%(default)s)")
+    parser.add_argument(
+        "--noise", type=float, default=0.5, metavar="STD", help="of which chunks are made; 1 as in training (%(default)g)"
+    )
     parser.add_argument("--max-steps", type=int, default=300, metavar="N", help="actions of a scene (%(default)s)")
     parser.add_argument(
         "--out", type=pathlib.Path, default=pathlib.Path("sigmaik-learn"), metavar="DIR", help="(%(default)s)"
@@ -52,15 +55,17 @@ def run(args: argparse.Namespace) -> int:
     for name in ("scenes", "execute", "denoise", "max_steps"):
         if getattr(args, name) < 1:
             raise ValueError(f"--{name.replace('_', '-')} must be positive")
+    if not 0.0 <= args.noise <= 1.0:
+        raise ValueError("--noise must be from 0 to 1")
     policies = args.policy or [*map(str, sorted(args.out.glob("policy-*.pt"))), DEMONSTRATOR]
     rules = args.rule or list(RULES)
     robot = _check(policies, rules, args.execute)
     seeds = range(HELD_OUT, HELD_OUT + args.scenes)
-    more = {"robot": robot, "region": args.region, "execute": args.execute, "denoise": args.denoise}
+    more = {name: getattr(args, name) for name in ("region", "execute", "denoise", "noise", "max_steps")}
     folder = args.out / "rollouts"
     work = {
         _file(folder, piece): piece
-        for piece in pieces(policies, rules, seeds, max_steps=args.max_steps, **more)
+        for piece in pieces(policies, rules, seeds, robot=robot, **more)
     }
     left = [piece for file, piece in work.items() if not _done(file, piece)]
     names = {piece: file for file, piece in work.items()}

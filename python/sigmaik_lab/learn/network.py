@@ -17,12 +17,12 @@ _KERNEL, _GROUPS = 5, 8
 
 
 class NoiseNet(nn.Module):
-    """The noise ε in chunks (B, H, width), from the chunks, noise levels (B,) and observations (B, seen).
+    """What `Diffusion` asks for, v (B, H, width), from noisy chunks, their levels (B,) and observations (B, seen).
 
     H must be a multiple of 2 to the power len(channels) − 1.
     """
 
-    def __init__(self, width: int, seen: int, channels: tuple[int, ...] = (64, 128, 128), hidden: int = 128) -> None:
+    def __init__(self, width: int, seen: int, channels: tuple[int, ...] = (32, 64), hidden: int = 128) -> None:
         super().__init__()
         self._levels = hidden // 2
         self.level = nn.Sequential(nn.Linear(self._levels, hidden), nn.Mish(), nn.Linear(hidden, hidden))

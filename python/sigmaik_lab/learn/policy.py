@@ -17,7 +17,7 @@ from sigmaik.files import write_atomically
 
 from .diffusion import Diffusion
 from .network import NoiseNet
-from .windows import FEATURES, HISTORY, WIDTH, absolute_chunks, features
+from .windows import FEATURES, WIDTH, absolute_chunks, features
 
 __all__ = ["Policy", "Scale", "Shape", "load_file", "load_policy", "save_file"]
 
@@ -34,7 +34,7 @@ class Shape:
     """What fixes a policy's network and noise levels."""
 
     horizon: int = 8  #: actions of a chunk
-    channels: tuple[int, ...] = (64, 128)  #: of the U-Net's levels
+    channels: tuple[int, ...] = (32, 64)  #: of the U-Net's levels
     hidden: int = 128
     levels: int = 100  #: of noise
 
@@ -73,22 +73,24 @@ class Policy:
         """A policy that is not trained, its weights drawn by the seed."""
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(seed)
-            network = NoiseNet(WIDTH, HISTORY * FEATURES, shape.channels, shape.hidden)
+            network = NoiseNet(WIDTH, FEATURES, shape.channels, shape.hidden)
         return Policy(robot, shape, scale, network)
 
-    def chunks(self, before: Floats, now: Floats, noise: Floats, steps: int = 10) -> Floats:
-        """(B, H, WIDTH) pose actions in the base, the first one for the observations `now`.
+    def chunks(self, states: Floats, noise: Floats, steps: int = 10) -> Floats:
+        """(B, H, WIDTH) pose actions in the base, the first one for the observations, states (B, S).
 
-        before, now: (B, S) states, an action apart; before = now at the start. noise: (B, H, WIDTH) of a normal
-        distribution, which alone decides among the ways that demonstrations show. steps: of DDIM.
+        noise: (B, H, WIDTH) of a normal distribution, which alone decides among the ways that demonstrations show; a
+        smaller standard deviation gives ways nearer to the most likely one. steps: of DDIM. The gripper's command is the
+        nearer one of 0 and 1, as demonstrations have no others.
         """
-        seen = features(np.stack([before, now], axis=1)).reshape(len(now), -1)
-        scaled = torch.from_numpy((seen - self.scale.seen_mean) / self.scale.seen_std)
+        scaled = torch.from_numpy((features(states) - self.scale.seen_mean) / self.scale.seen_std)
         self.network.eval()
         diffusion = Diffusion(self.shape.levels)
         most = torch.from_numpy(self.scale.most)
         found = diffusion.sample(self.network, torch.from_numpy(noise), scaled, steps, most).numpy()
-        return absolute_chunks(now, found * self.scale.said_std + self.scale.said_mean)
+        chunks = absolute_chunks(states, found * self.scale.said_std + self.scale.said_mean)
+        chunks[..., -1] = chunks[..., -1] > 0.5
+        return chunks
 
     def with_network(self, network: NoiseNet) -> Policy:
         return dataclasses.replace(self, network=copy.deepcopy(network))

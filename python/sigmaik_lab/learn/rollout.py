@@ -39,6 +39,7 @@ class Piece:
     region: Region = "edge"
     execute: int = 4  #: actions of a chunk that are done before the policy looks again
     denoise: int = 10  #: steps of DDIM
+    noise: float = 0.5  #: standard deviation of the noise that chunks are made of; 1 as in training
     max_steps: int = 300
 
 
@@ -91,16 +92,13 @@ class _PolicyDriver:
             raise ValueError(f"{piece.policy} was trained on {self._policy.robot}, not on {piece.robot}")
         # Noise of its own for each scene, so that a scene's answer does not depend on its neighbours.
         self._rngs = [np.random.default_rng([seed, 0xD1FF]) for seed in piece.seeds]
-        self._before: Floats | None = None
         self._chunk: Floats = np.empty(0, dtype=np.float32)
 
     def act(self, step: int, states: Floats) -> Floats:
         if step % self._piece.execute == 0:
-            before = states if self._before is None else self._before
             shape = self._policy.scale.said_mean.shape
             noise = np.stack([rng.standard_normal(shape, dtype=np.float32) for rng in self._rngs])
-            self._chunk = self._policy.chunks(before, states, noise, self._piece.denoise)
-        self._before = states.copy()
+            self._chunk = self._policy.chunks(states, self._piece.noise * noise, self._piece.denoise)
         return self._chunk[:, step % self._piece.execute]
 
 

@@ -115,7 +115,7 @@ class Trainer:
     def _advance(self) -> None:
         self.network.train()
         rows = torch.randint(self._frames, (self.training.batch,), generator=self.generator)
-        loss = self.diffusion.loss(self.network, self._said[rows], self._seen[rows], self.generator)
+        loss, noise_loss = self.diffusion.losses(self.network, self._said[rows], self._seen[rows], self.generator)
         for group in self.optimizer.param_groups:
             group["lr"] = self.training.rate * self._part(self.step)
         self.optimizer.zero_grad()
@@ -127,7 +127,7 @@ class Trainer:
         with torch.no_grad():
             for mean, new in zip(self.policy.network.parameters(), self.network.parameters(), strict=True):
                 mean.lerp_(new, 1.0 - memory)
-        self._sum, self._count = self._sum + float(loss.detach()), self._count + 1
+        self._sum, self._count = self._sum + float(noise_loss), self._count + 1
 
     def _part(self, step: int) -> float:
         """Of the largest learning rate."""
@@ -156,7 +156,8 @@ class Trainer:
         self.policy.network.eval()
         with torch.no_grad():
             # The same noise each time, so that the losses of two steps can be compared.
-            return float(self.diffusion.loss(self.policy.network, said, seen, torch.Generator().manual_seed(1)))
+            _, loss = self.diffusion.losses(self.policy.network, said, seen, torch.Generator().manual_seed(1))
+        return float(loss)
 
     def _scaled(self, episodes: Sequence[Episode]) -> tuple[Tensor, Tensor]:
         seen, said = windows(episodes, self.shape.horizon)

@@ -11,12 +11,10 @@ from sigmaik._types import Array
 
 from .episode import Episode, layout, rotation_6d, rotation_of_6d
 
-__all__ = ["FEATURES", "HISTORY", "WIDTH", "absolute_chunks", "features", "relative_chunks", "windows"]
+__all__ = ["FEATURES", "WIDTH", "absolute_chunks", "features", "relative_chunks", "windows"]
 
 Floats = NDArray[np.float32]
 
-#: Observations that a policy sees. From two, one a step before, it learns to stand still where it stands still.
-HISTORY = 1
 #: Entries of a pose action: position (3), 6-D rotation (6), gripper (1).
 WIDTH = 10
 #: [m] lengths at which offsets saturate in the features that show small offsets large.
@@ -67,17 +65,18 @@ def absolute_chunks(states: Floats, chunks: Floats) -> Floats:
 
 
 def windows(episodes: Sequence[Episode], horizon: int) -> tuple[Floats, Floats]:
-    """Features (N, HISTORY * FEATURES) and chunks (N, horizon, WIDTH) of every frame of all episodes.
+    """Features (N, FEATURES) and chunks (N, horizon, WIDTH) of every frame of all episodes; after an episode's end its last
+    action stands.
 
-    Before an episode its first observation stands, and after its end its last action.
+    A policy sees one observation, and not the one before: from two it learns to stand still where it stood still, as a
+    demonstrator does in a pause.
     """
     seen, said = [], []
     for episode in episodes:
         n = len(episode.times)
         steps = np.arange(n)
-        back = np.maximum(steps[:, None] + np.arange(1 - HISTORY, 1), 0)
         ahead = np.minimum(steps[:, None] + np.arange(horizon), n - 1)
-        seen.append(features(episode.state)[back].reshape(n, -1))
+        seen.append(features(episode.state))
         said.append(relative_chunks(episode.state, episode.action[ahead]))
     return np.concatenate(seen), np.concatenate(said)
 
