@@ -1,5 +1,4 @@
-"""Pictures of the task, by MuJoCo's offscreen renderer. Needs mujoco, and OpenGL: a GPU's, or Mesa's in software.
-"""
+"""Pictures of the task, by MuJoCo's offscreen renderer. Needs mujoco, and OpenGL: a GPU's, or Mesa's in software."""
 
 from __future__ import annotations
 
@@ -22,7 +21,7 @@ class Camera:
     def __init__(self, task: Task, size: int) -> None:
         """size: pixels of a side. OSError where no OpenGL is found; the text says what to install."""
         choose_opengl()
-        import mujoco
+        import mujoco  # type: ignore[import-untyped]
 
         self._scene: SceneModel = scene_model(task, contacts=False)
         self._data = mujoco.MjData(self._scene.model)

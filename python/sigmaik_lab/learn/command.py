@@ -8,7 +8,7 @@ import importlib
 __all__ = ["TOOLS", "options", "run"]
 
 #: Tools in the order in which they are used. The first line of a module's docstring is its line of help.
-TOOLS = ("record", "train", "evaluate", "show", "export")
+TOOLS = ("record", "train", "evaluate", "show", "export", "speed")
 
 
 def options(parser: argparse.ArgumentParser) -> None:

@@ -29,7 +29,7 @@ class ContactWorld(World):
     makes of them; observations are what physics does."""
 
     def __init__(self, task: Task, drive: Drive, action: Action) -> None:
-        import mujoco
+        import mujoco  # type: ignore[import-untyped]
 
         super().__init__(task, drive, action, 1)
         self._scene = scene_model(task, contacts=True)
@@ -100,4 +100,3 @@ class ContactWorld(World):
         cup = self._geoms["cup"]
         pairs = [tuple(pair) for pair in self._data.contact.geom]
         return {names[a + b - cup] for a, b in pairs if cup in (a, b) and a + b - cup in names}
-

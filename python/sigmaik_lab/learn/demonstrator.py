@@ -1,8 +1,8 @@
 """A scripted demonstrator with the noise of a hand.
 
 What the demonstrator does is a function of the observation: it looks at the cup, the gripper and the goal, so that it
-recovers from a push, from a cup that it did not get, and from a cup that it dropped. What it remembers is only its hand's
-noise and how long it pauses.
+recovers from a push, from a cup that it did not get, and from a cup that it dropped. All that it remembers is the noise
+of its hand and how long it pauses.
 """
 
 from __future__ import annotations
@@ -25,8 +25,9 @@ __all__ = ["STEADY", "Demonstrator", "Hand"]
 _HOLDS = 2.0 * CUP.radius / GRIPPER.stroke
 #: [m] of the point before the cup, and beside whose axis the tool goes ahead.
 _BEFORE, _BESIDE = 0.09, 0.008
-#: [m] within which the tool is at the cup, along and across, and beyond which an open gripper still closes.
-_AT, _AWAY = 0.006, 0.012
+#: [m] within which the tool is at the cup, along and across, so that the gripper closes, and within which a gripper
+#: that is as wide as the cup has the cup.
+_AT, _KEEP = 0.006, 0.02
 #: [m] by which a cup is lifted on its way, and the horizontal distance from the goal at which it goes down.
 _LIFT, _DOWN = 0.06, 0.01
 #: [m] above its shelf from which a cup is carried away.
@@ -84,7 +85,7 @@ class Demonstrator:
         way = shorten(difference(pose, target), hand.speed / FPS, hand.turning / FPS)
         way, grip = self._disturb(way, grip, care)
         if self._action == "twist":
-            return np.clip(np.append(way * FPS, grip), -1.0, 1.0).astype(np.float32)
+            return np.asarray(np.clip(np.append(way * FPS, grip), -1.0, 1.0), dtype=np.float32)
         rotation = rotations(way[3:]) @ pose[:3, :3]
         return np.concatenate([pose[:3, 3] + way[:3], rotation_6d(rotation), [grip]]).astype(np.float32)
 
@@ -102,12 +103,15 @@ class Demonstrator:
         off = hold[:3, :3].T @ (cup - tool)
         across = float(np.hypot(off[0], off[1]))
         turned = float(np.linalg.norm(difference(pose, hold)[3:]))
-        if np.linalg.norm((cup - goal)[:2]) < 0.8 * AT_GOAL and abs(cup[2] - goal[2]) < 1e-4 and opening > _HOLDS + 0.03:
+        if (
+            np.linalg.norm((cup - goal)[:2]) < 0.8 * AT_GOAL
+            and abs(cup[2] - goal[2]) < _LET_GO
+            and opening > _HOLDS + 0.03
+        ):
             return self._back(pose, hold), 1.0, False  # done
-        at_cup = abs(off[2]) < _AWAY and across < _AWAY
-        if at_cup and opening < _HOLDS + 0.015:
+        if max(abs(off[2]), across) < _KEEP and _HOLDS - 0.015 < opening < _HOLDS + 0.015:
             return self._carry(pose, cup, goal)
-        if at_cup and abs(off[2]) < _AT and across < _AT:
+        if max(abs(off[2]), across) < _AT and opening > _HOLDS:
             return hold, 0.0, True
         if opening < 0.95:
             # Closed on nothing, or not yet open: away from the cup, and open.
@@ -158,7 +162,7 @@ class Demonstrator:
         if self._paused == 0 and starts_pause:
             self._paused = 1 + int(rng.exponential(hand.pause * FPS))
         if self._slips == 0 and slips and not care:
-            self._slips, self._aside = 4, hand.push * aside / max(np.linalg.norm(aside), 1e-9)
+            self._slips, self._aside = 4, hand.push * aside / max(float(np.linalg.norm(aside)), 1e-9)
         if self._paused:
             self._paused -= 1
             return 0.0 * way, grip

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 import sigmaik as sk
 from sigmaik._types import Array
@@ -31,9 +32,12 @@ class Drive(Protocol):
 
     dt: float  #: [s] a cycle
     cycles: int  #: of an action
-    q: Array  #: (B, n) joint positions after the last cycle
 
-    def reset(self, q: Array, mask: Array) -> None:
+    @property
+    def q(self) -> Array:
+        """(B, n) joint positions after the last cycle."""
+
+    def reset(self, q: Array, mask: NDArray[np.bool_]) -> None:
         """Starts the arms of a mask (B,) at rest at q (B, n)."""
 
     def follow(self, start: Array, end: Array) -> Array:
@@ -83,7 +87,7 @@ class _Servos:
     def q(self) -> Array:
         return self._batch.q
 
-    def reset(self, q: Array, mask: Array) -> None:
+    def reset(self, q: Array, mask: NDArray[np.bool_]) -> None:
         self._batch.reset(q, mask)
 
     def follow(self, start: Array, end: Array) -> Array:
@@ -158,7 +162,7 @@ class _PositionIk:
         self._chain, self._ik = chain, sk.PositionIk(chain)
         self.q: Array = np.full((size, chain.dof), np.nan)
 
-    def reset(self, q: Array, mask: Array) -> None:
+    def reset(self, q: Array, mask: NDArray[np.bool_]) -> None:
         self.q = np.where(mask[:, None], q, self.q)
 
     def follow(self, start: Array, end: Array) -> Array:

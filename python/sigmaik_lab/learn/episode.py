@@ -66,8 +66,8 @@ class Layout:
 def layout(dof: int) -> Layout:
     """The layout of the state of an arm with `dof` joints."""
     ends = np.cumsum([0, 3, 6, 1, 3, 3, 1, dof, dof]).tolist()
-    parts = [slice(first, last) for first, last in zip(ends[:-1], ends[1:], strict=True)]
-    return Layout(*parts, size=ends[-1])
+    tool, rotation, gripper, cup, goal, sigma, q, qdot = map(slice, ends[:-1], ends[1:])
+    return Layout(tool, rotation, gripper, cup, goal, sigma, q, qdot, ends[-1])
 
 
 def state_names(joint_names: Sequence[str]) -> list[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, Literal, SupportsFloat, TypeAlias
+from typing import Any, Literal, SupportsFloat, TypeAlias
 
 import gymnasium
 import numpy as np
@@ -35,7 +35,7 @@ class Fetch(gymnasium.Env[Observation, NDArray[np.float32]]):
     it is truncated after max_steps.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array"], "render_fps": FPS}
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": FPS}
 
     def __init__(
         self,
@@ -80,9 +80,9 @@ class Fetch(gymnasium.Env[Observation, NDArray[np.float32]]):
             self.world: World = ContactWorld(self.task, drive, action)
         else:
             self.world = World(self.task, drive, action, 1)
-        self.action_space = action_space(self.task, action)
+        self.action_space: gymnasium.spaces.Space[Any] = action_space(self.task, action)
         state = state_space(self.task)
-        self.observation_space = _with_image(state) if image else state
+        self.observation_space: gymnasium.spaces.Space[Any] = _with_image(state) if image else state
         self._steps = 0
         self._cameras: dict[int, Any] = {}
 
@@ -105,7 +105,7 @@ class Fetch(gymnasium.Env[Observation, NDArray[np.float32]]):
         ends = info["success"] or info["lost"]
         return self._observe(), float(info["success"]), ends, not ends and self._steps >= self._max_steps, info
 
-    def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
+    def render(self) -> NDArray[np.uint8] | None:
         """A picture (480, 480, 3) RGB with render_mode="rgb_array", else None."""
         return self._picture(_PICTURE) if self.render_mode == "rgb_array" else None
 

@@ -126,7 +126,12 @@ def _add_gripper(spec: Any, flange: Any, tip: Array) -> None:
     )
     for side, name in ((1.0, "left"), (-1.0, "right")):
         finger = flange.add_body(
-            name=name, pos=tip[:3, 3], quat=quaternion(tip[:3, :3]), mass=_FINGER, inertia=[2e-5] * 3, explicitinertial=True
+            name=name,
+            pos=tip[:3, 3],
+            quat=quaternion(tip[:3, :3]),
+            mass=_FINGER,
+            inertia=[2e-5] * 3,
+            explicitinertial=True,
         )
         finger.gravcomp = 1.0
         finger.add_joint(
@@ -196,7 +201,8 @@ def _add_view(task: Task, spec: Any) -> None:
     back = (eye - look) / np.linalg.norm(eye - look)
     right = np.cross([0.0, 0.0, 1.0], back)
     right /= np.linalg.norm(right)
-    spec.worldbody.add_camera(name="view", pos=eye, quat=quaternion(np.stack([right, np.cross(back, right), back], axis=1)))
+    spec.worldbody.add_camera(
+        name="view", pos=eye, quat=quaternion(np.stack([right, np.cross(back, right), back], axis=1))
+    )
     spec.worldbody.add_light(pos=[0.0, -1.0, 3.0], dir=[0.0, 0.3, -1.0])
     spec.visual.headlight.ambient = [0.4, 0.4, 0.4]
-

@@ -37,7 +37,7 @@ def rotations(vector: Array) -> Array:
     # sin θ/θ and (1 − cos θ)/θ², by numpy's sinc, which is right at zero.
     first = np.sinc(angle / np.pi)
     second = 0.5 * np.sinc(0.5 * angle / np.pi) ** 2
-    return np.eye(3) + first * cross + second * (cross @ cross)
+    return np.asarray(np.eye(3) + first * cross + second * (cross @ cross))
 
 
 def difference(start: Array, end: Array) -> Array:
@@ -66,4 +66,4 @@ def shorten(way: Array, most_linear: float, most_angular: float) -> Array:
     """
     linear, angular = np.linalg.norm(way[..., :3], axis=-1), np.linalg.norm(way[..., 3:], axis=-1)
     part = np.maximum(1.0, np.maximum(linear / most_linear, angular / most_angular))
-    return way / part[..., None]
+    return np.asarray(way / part[..., None])

@@ -38,7 +38,7 @@ class Scenes:
 
 
 def demonstrate(scenes: Scenes, seeds: Sequence[int], demonstrator: str = "scripted") -> list[tuple[Episode, int]]:
-    """An episode for each seed, and in how many cycles a limit was broken. A seed's episode depends on no other seed."""
+    """An episode for each seed, and its number of cycles beyond a limit. An episode depends on its own seed alone."""
     hand = DEMONSTRATORS[demonstrator]
     if scenes.together:
         return _together(scenes, seeds, hand)
@@ -54,7 +54,11 @@ class _Log:
         self._images: list[NDArray[np.uint8]] = []
 
     def add(
-        self, state: NDArray[np.float32], action: NDArray[np.float32], phase: str, image: NDArray[np.uint8] | None = None
+        self,
+        state: NDArray[np.float32],
+        action: NDArray[np.float32],
+        phase: str,
+        image: NDArray[np.uint8] | None = None,
     ) -> None:
         self._rows.append((state.copy(), action.copy(), phase))
         if image is not None:
@@ -102,10 +106,10 @@ def _together(scenes: Scenes, seeds: Sequence[int], hand: Hand) -> list[tuple[Ep
                 actions[b] = demonstrators[b](states[b])
                 logs[b].add(states[b], actions[b], str(info["phase"][b]))
         states, _, terminated, truncated, info = env.step(actions)
-        for b in np.flatnonzero(terminated | truncated):
+        for b in np.flatnonzero(terminated | truncated).tolist():
             if b not in found:
                 episode = logs[b].episode(bool(info["success"][b]), env.task.robot, cups[b], goals[b])
-                found[int(b)] = (episode, int(info["limits_broken"][b]))
+                found[b] = (episode, int(info["limits_broken"][b]))
     return [found[b] for b in range(size)]
 
 

@@ -26,14 +26,14 @@ if TYPE_CHECKING:
 
 __all__ = ["options", "record", "run"]
 
-#: Scenes that step together. An episode does not depend on it.
+#: The most scenes that step together. An episode does not depend on it.
 _WAVE = 23
 #: Attempts for each demonstration that is asked for, after which a demonstrator that fails is no longer tried.
 _PATIENCE = 4
 
 
 def options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--episodes", type=int, default=92, metavar="N", help="that succeed (%(default)s, as in the paper)")
+    parser.add_argument("--episodes", type=int, default=92, metavar="N", help="that succeed (%(default)s, the paper's)")
     parser.add_argument(
         "--demonstrator", choices=tuple(DEMONSTRATORS), default="scripted", help="steady: without noise (%(default)s)"
     )
@@ -92,7 +92,7 @@ def record(
     progress.advance(min(len(writer), episodes))
     tried: list[dict[str, Any]] = []
     while len(writer) < episodes:
-        wave = _WAVE if scenes.together else 1
+        wave = min(_WAVE, episodes - len(writer)) if scenes.together else 1
         for episode, broken in demonstrate(scenes, range(following, following + wave), demonstrator):
             if len(writer) == episodes:
                 break
@@ -114,7 +114,9 @@ def _check(writer: Writer, scenes: Scenes, folder: pathlib.Path) -> None:
     for scene in writer.scenes():
         for name in ("rule", "region", "action", "physics"):
             if scene.get(name) != getattr(scenes, name):
-                raise sk.Error(f"{folder} has demonstrations with {name} {scene.get(name)}, not {getattr(scenes, name)}")
+                raise sk.Error(
+                    f"{folder} has demonstrations with {name} {scene.get(name)}, not {getattr(scenes, name)}"
+                )
 
 
 def _table(tried: list[dict[str, Any]]) -> Table:

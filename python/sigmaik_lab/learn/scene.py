@@ -34,7 +34,7 @@ _PITCHES = {"edge": (0.35, 0.7, 0.0, 1.1), "overhead": (0.0, 0.35)}
 _OVERHEAD = 0.3
 #: [m] height of the other shelves.
 _SHELF = 0.02
-#: [rad] azimuth of the goal's disc, and its distance from axis 1 as a part of the edge's: the first that the arm can do.
+#: [rad] azimuth of the goal's disc, and its distance from axis 1 as a part of the reach: the first that the arm can do.
 _GOAL_AZIMUTH, _GOAL_PARTS = 1.0, (0.5, 0.55, 0.6, 0.65, 0.7)
 #: Distances from axis 1, as parts of the lengths of all links together, at which the search begins.
 _STARTS = (0.35, 0.45, 0.55)
@@ -110,7 +110,7 @@ class Task:
         """(…) height [m] of what a cup at (…, 3) stands on: the shelf of the disc that is nearer."""
         to_cup = np.linalg.norm(point[..., :2] - self.cup[:2], axis=-1)
         to_goal = np.linalg.norm(point[..., :2] - self.goal[:2], axis=-1)
-        return np.where(to_cup < to_goal, self.cup[2], self.goal[2]) - 0.5 * CUP.height
+        return np.asarray(np.where(to_cup < to_goal, self.cup[2], self.goal[2]) - 0.5 * CUP.height)
 
     def draw(self, rng: np.random.Generator, options: dict[str, Any] | None = None) -> Draw:
         """Draws an episode. options: "cup" and "goal" (3,) take the place of what is drawn. ValueError for others."""
@@ -183,7 +183,9 @@ def _place(task: Task) -> Task | None:
     for part in _GOAL_PARTS:
         away = part * task.reach
         goal = np.array([away * np.cos(_GOAL_AZIMUTH), away * np.sin(_GOAL_AZIMUTH), low])
-        corners = [goal + [_SPREAD * x, _SPREAD * y, z] for x, y, z in ((1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, _LIFT))]
+        corners = [
+            goal + [_SPREAD * x, _SPREAD * y, z] for x, y, z in ((1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, _LIFT))
+        ]
         if all(ik.solve(task.hold(p), near=task.start).status == sk.PositionIkStatus.OK for p in corners):
             placed = dataclasses.replace(task, goal=goal)
             if _servo_arrives(placed):

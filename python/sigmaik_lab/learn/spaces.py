@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-
-from sigmaik._types import Array
+from numpy.typing import NDArray
 
 from .episode import PHASES, Action, layout
 from .scene import Task
@@ -15,7 +14,7 @@ from .world import World
 if TYPE_CHECKING:
     from gymnasium import spaces
 
-__all__ = ["IMAGE", "action_space", "information", "state_space"]
+__all__ = ["IMAGE", "action_space", "information", "one", "state_space"]
 
 #: Pixels of an image's side.
 IMAGE = 96
@@ -50,16 +49,15 @@ def action_space(task: Task, action: Action) -> spaces.Box:
     rotation and the gripper's opening; a twist has v [m/s], ω [rad/s] and the opening."""
     from gymnasium import spaces
 
+    high = np.ones(10 if action == "pose" else 7)
     if action == "pose":
-        high = np.concatenate([np.full(3, max(1.0, 1.1 * task.reach)), np.ones(7)])
-    else:
-        high = np.ones(7)
+        high[:3] = max(1.0, 1.1 * task.reach)
     low = -high
     low[-1] = 0.0
     return spaces.Box(low.astype(np.float32), high.astype(np.float32), dtype=np.float32)
 
 
-def information(world: World) -> dict[str, Array]:
+def information(world: World) -> dict[str, NDArray[Any]]:
     """What is told beside the observations, (B, …) each.
 
     phase: where the arm is now; reached: the furthest phase that is behind it, "" for none (both of PHASES); success,

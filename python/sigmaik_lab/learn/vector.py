@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -26,11 +26,12 @@ __all__ = ["FetchVector"]
 class FetchVector(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any]]):
     """B environments `Fetch`, kinematic and without images, which step together.
 
-    Environment b does what a `Fetch` does with the same seed and actions. An environment that ended is reset by the next
-    `step`, which ignores its action (Gymnasium's NEXT_STEP). `info` has an array (B, …) for each name of `Fetch`'s.
+    Environment b does, to the last bit, what a `Fetch` does with the same seed and actions. An environment that ended
+    is reset by the next `step`, which ignores its action (Gymnasium's NEXT_STEP). `info` has an array (B, …) for each
+    name of `Fetch`'s.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {
+    metadata: dict[str, Any] = {
         "render_modes": [],
         "render_fps": FPS,
         "autoreset_mode": AutoresetMode.NEXT_STEP,
@@ -64,9 +65,12 @@ class FetchVector(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[An
     def reset(
         self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
-        """seed: environment b has seed + b; or a list of one for each. options: "cup" and "goal" as for `Fetch`, (3,) for
-        all environments or (B, 3)."""
-        seeds = [None if seed is None else seed + b for b in range(self.num_envs)] if _is_one(seed) else list(seed)
+        """seed: environment b has seed + b; or a list of one for each. options: "cup" and "goal" as for `Fetch`, (3,)
+        for all environments or (B, 3)."""
+        if isinstance(seed, list):
+            seeds = seed
+        else:
+            seeds = [None if seed is None else int(seed) + b for b in range(self.num_envs)]
         if len(seeds) != self.num_envs:
             raise ValueError(f"{len(seeds)} seeds were given for {self.num_envs} environments")
         for b, value in enumerate(seeds):
@@ -102,7 +106,3 @@ class FetchVector(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[An
             draws[b] = self.task.draw(self._rngs[b], own)
         self.world.reset(draws)
         self._steps[mask] = 0
-
-
-def _is_one(seed: object) -> bool:
-    return seed is None or isinstance(seed, (int, np.integer))

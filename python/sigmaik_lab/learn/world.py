@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from sigmaik._types import Array
 
@@ -32,16 +34,20 @@ _NOISE = 1e-6
 _LET_GO = 0.02
 
 
+Counts: TypeAlias = NDArray[np.int64]
+Flags: TypeAlias = NDArray[np.bool_]
+
+
 @dataclass
 class LimitCounts:
     """(B,) cycles in which a joint was beyond a limit, counted from the positions alone."""
 
-    position: Array
-    velocity: Array
-    acceleration: Array
+    position: Counts
+    velocity: Counts
+    acceleration: Counts
 
     @property
-    def all(self) -> Array:
+    def all(self) -> Counts:
         """(B,) of all kinds together."""
         return self.position + self.velocity + self.acceleration
 
@@ -86,9 +92,9 @@ class World:
         self.target[mask] = self.pose[mask]
         self.reached = np.maximum(self.reached, np.where(self.phase > 0, 0, -1))
 
-    def step(self, action: Array) -> None:
+    def step(self, actions: ArrayLike) -> None:
         """One action (B, A) of all arms."""
-        action = np.asarray(action, dtype=np.float64)
+        action: Array = np.asarray(actions, dtype=np.float64)
         before = self.pose.copy()
         if self.action == "pose":
             asked = np.tile(np.eye(4), (self.size, 1, 1))
@@ -108,13 +114,13 @@ class World:
         self.reached = np.maximum(self.reached, self._progress())
 
     @property
-    def phase(self) -> Array:
+    def phase(self) -> NDArray[np.intp]:
         """(B,) index of PHASES in which each arm is now."""
         near = np.linalg.norm(self.pose[:, :3, 3] - self.cup, axis=1) < _NEAR_CUP
         over_goal = np.linalg.norm((self.cup - self.goal)[:, :2], axis=1) < _NEAR_GOAL
         return np.select([self.placed | (self.held & over_goal), self.held, near], [3, 2, 1], 0)
 
-    def state(self) -> Array:
+    def state(self) -> NDArray[np.float32]:
         """(B, S) float32, as `episode.state_names` names it."""
         parts = self._layout
         state = np.empty((self.size, parts.size), dtype=np.float32)
@@ -130,7 +136,7 @@ class World:
         self.pose = self.task.chain.pose(self.q)
         self.sigma = sigma_ratio(self.task.chain, self.q, self._length)
 
-    def _progress(self) -> Array:
+    def _progress(self) -> NDArray[np.intp]:
         """(B,) the phase that is behind the arm: grasp once the cup is held, place once the cup stands at the goal."""
         phase = self.phase
         return np.select([self.placed, self.held & (phase == 3), self.held, phase >= 1], [3, 2, 1, 0], -1)
@@ -171,19 +177,20 @@ class World:
                 self._let_go(pose, opens)
         return path[-1].copy(), (path[-1] - path[-2]) / self.drive.dt
 
-    def _between(self, pose: Array) -> Array:
+    def _between(self, pose: Array) -> Flags:
         """(B,) whether the cup is between the fingers, and upright to them."""
         local = np.einsum("bij,bi->bj", pose[:, :3, :3], self.cup - pose[:, :3, 3])
         room = 0.5 * self.opening * GRIPPER.stroke - CUP.radius
         upright = np.abs(pose[:, 2, 1]) < np.sin(_LEAN)  # y of the tool is level
-        return (
+        inside: Flags = (
             upright
             & (np.abs(local[:, 0]) < GRIPPER.height)
             & (np.abs(local[:, 1]) <= np.maximum(room, 0.0) + 1e-3)
             & (np.abs(local[:, 2]) < GRIPPER.depth)
         )
+        return inside
 
-    def _take(self, pose: Array, closes: Array) -> None:
+    def _take(self, pose: Array, closes: Flags) -> None:
         local = np.einsum("bij,bi->bj", pose[:, :3, :3], self.cup - pose[:, :3, 3])
         local[:, 1] = 0.0  # the fingers push the cup to the middle
         self._offset = np.where(closes[:, None], local, self._offset)
@@ -192,7 +199,7 @@ class World:
         carried = pose[:, :3, 3] + np.einsum("bij,bj->bi", pose[:, :3, :3], self._offset)
         self.cup = np.where(self.held[:, None], carried, self.cup)
 
-    def _let_go(self, pose: Array, opens: Array) -> None:
+    def _let_go(self, pose: Array, opens: Flags) -> None:
         """A cup that is let go upright and near its shelf stands there, another one is lost."""
         stands = self.task.support(self.cup) + 0.5 * CUP.height
         fall = self.cup[:, 2] - stands
@@ -202,4 +209,3 @@ class World:
         self.cup[:, 2] = np.where(opens, stands, self.cup[:, 2])
         at_goal = np.linalg.norm((self.cup - self.goal)[:, :2], axis=1) < AT_GOAL
         self.placed |= opens & good & at_goal
-
