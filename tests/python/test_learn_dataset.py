@@ -137,7 +137,12 @@ def test_statistics_are_those_of_all_frames(tmp_path):
     episodes = [make(k, 30, True) for k in range(4)]
     stats = dataset.statistics(write(tmp_path / "d", episodes, True))
     states = np.concatenate([e.state for e in episodes]).astype(float)
-    for name, value in (("min", states.min(0)), ("max", states.max(0)), ("mean", states.mean(0)), ("std", states.std(0))):
+    for name, value in (
+        ("min", states.min(0)),
+        ("max", states.max(0)),
+        ("mean", states.mean(0)),
+        ("std", states.std(0)),
+    ):
         np.testing.assert_allclose(stats["observation.state"][name], value, atol=1e-9)
     assert stats["observation.state"]["count"] == [120]
     quantiles = np.array([np.quantile(e.state.astype(float), list(QUANTILES.values()), axis=0) for e in episodes])
@@ -176,7 +181,9 @@ def test_added_episodes_survive_and_the_next_writer_goes_on(tmp_path):
         np.testing.assert_allclose(once["action"][name], twice["action"][name], atol=1e-12)
 
 
-@pytest.mark.parametrize("ends_at", ["meta/tasks.parquet", "data", "meta/episodes", "meta/stats.json", "meta/info.json"])
+@pytest.mark.parametrize(
+    "ends_at", ["meta/tasks.parquet", "data", "meta/episodes", "meta/stats.json", "meta/info.json"]
+)
 def test_a_program_that_ends_within_close_loses_nothing(tmp_path, monkeypatch, ends_at):
     folder = write(tmp_path / "d", [make(0, 20), make(1, 20)])
     broken = writer(folder)
@@ -266,7 +273,11 @@ def test_gaps_and_clocks_that_go_back_are_refused():
     for times, said in ((np.r_[0:1:0.1, 1.5:2:0.1], "more than a frame"), (np.r_[0:1:0.1, 0.5], "must rise")):
         n = len(times)
         episode = Episode(
-            times, np.zeros((n, len(STATE)), np.float32), np.zeros((n, len(ACTION)), np.float32), np.array([""] * n), True
+            times,
+            np.zeros((n, len(STATE)), np.float32),
+            np.zeros((n, len(ACTION)), np.float32),
+            np.array([""] * n),
+            True,
         )
         with pytest.raises(sk.Error, match=said):
             resample(episode, 10, STATE, ACTION)
@@ -276,7 +287,7 @@ def test_gaps_and_clocks_that_go_back_are_refused():
 
 
 def real_package():
-    """LeRobotDataset. Its imports take torchvision, whose operators a PyTorch for CPUs may lack; the reader uses none."""
+    """LeRobotDataset. Its imports take torchvision, whose operators a PyTorch for CPUs may lack; none is used."""
     torch = pytest.importorskip("torch")
     pytest.importorskip("lerobot")
     operators = torch.library.Library("torchvision", "FRAGMENT")

@@ -69,7 +69,10 @@ def test_offsets_do_not_change_when_everything_is_moved():
     moved[parts.rotation] = rotation_6d(turn @ rotation_of_6d(state[parts.rotation]))
     offsets = slice(0, FEATURES - 11)
     np.testing.assert_allclose(features(moved)[offsets], features(state)[offsets], atol=1e-5)
-    assert np.abs(features(moved)[FEATURES - 11 : FEATURES - 8] - features(state)[FEATURES - 11 : FEATURES - 8]).max() > 0.1
+    assert (
+        np.abs(features(moved)[FEATURES - 11 : FEATURES - 8] - features(state)[FEATURES - 11 : FEATURES - 8]).max()
+        > 0.1
+    )
 
 
 def test_windows_hold_the_last_action():
@@ -166,7 +169,9 @@ def test_the_network_sees_observation_level_and_time():
 
 
 def trainer(steps=12, seed=0, episodes=4, **changes):
-    return Trainer("ufactory_xarm7", [reach(k) for k in range(episodes)], Training(steps, 16, seed=seed, **changes), SMALL)
+    return Trainer(
+        "ufactory_xarm7", [reach(k) for k in range(episodes)], Training(steps, 16, seed=seed, **changes), SMALL
+    )
 
 
 def weights(policy):
@@ -187,7 +192,9 @@ def test_an_interrupted_run_ends_with_the_same_weights(tmp_path):
     assert torch.equal(weights(again.run(file, every=3)), weights(whole))  # nothing is left to do
 
 
-@pytest.mark.parametrize(("changes", "said"), [({"steps": 13}, "training"), ({"seed": 2}, "training"), ({"episodes": 3}, "data")])
+@pytest.mark.parametrize(
+    ("changes", "said"), [({"steps": 13}, "training"), ({"seed": 2}, "training"), ({"episodes": 3}, "data")]
+)
 def test_a_checkpoint_of_another_run_is_refused(tmp_path, changes, said):
     file = tmp_path / "checkpoint"
     trainer().run(file, every=3, until=3)
@@ -251,7 +258,7 @@ def test_files_that_are_no_policies_are_refused(tmp_path, capsys):
         with pytest.raises(sk.Error):
             load_policy(tmp_path / name)
     assert "run" not in capsys.readouterr().out
-    with pytest.raises(OSError):
+    with pytest.raises(FileNotFoundError):
         load_policy(tmp_path / "nothing.pt")
 
 

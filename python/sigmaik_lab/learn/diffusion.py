@@ -1,11 +1,11 @@
 """Adding noise to chunks of actions, and taking noise away again. Needs torch.
 
-DDPM (Ho et al. 2020), equations (57) and (58) of J-PARSE's paper: a network learns the noise that was added, by the mean
-squared error; at inference the noise is taken away in few steps by DDIM (Song et al. 2021), which is (57) without the
-random part.
+DDPM (Ho et al. 2020), equations (57) and (58) of J-PARSE's paper: a network learns the noise that was added, by the
+mean squared error; at inference the noise is taken away in few steps by DDIM (Song et al. 2021), which is (57)
+without the random part.
 
-The network gives v = √ᾱ ε − √(1−ᾱ) x (Salimans and Ho 2022), from which follow the noise ε and the clean chunk x. Where a
-network gives ε itself, x = (noisy − √(1−ᾱ) ε)/√ᾱ divides its error by √ᾱ, which is nearly zero where the denoising
+The network gives v = √ᾱ ε − √(1−ᾱ) x (Salimans and Ho 2022), from which follow the noise ε and the clean chunk x. Where
+a network gives ε itself, x = (noisy − √(1−ᾱ) ε)/√ᾱ divides its error by √ᾱ, which is nearly zero where the denoising
 begins: chunks of a network that was trained for minutes then tremble.
 """
 

@@ -33,14 +33,21 @@ def options(parser: argparse.ArgumentParser) -> None:
         help=f"may be repeated; '{DEMONSTRATOR}' is the scripted one (all policies of --out, and the demonstrator)",
     )
     parser.add_argument(
-        "--rule", action="append", metavar="NAME", help=f"of `sk.methods`, {', '.join(BASELINES)}, default; may be repeated"
+        "--rule",
+        action="append",
+        metavar="NAME",
+        help=f"of `sk.methods`, {', '.join(BASELINES)}, default; may be repeated",
     )
     parser.add_argument("--scenes", type=int, default=100, metavar="N", help="held-out scenes (%(default)s)")
     parser.add_argument("--region", choices=REGIONS, default="edge", help="(%(default)s)")
     parser.add_argument("--execute", type=int, default=4, metavar="N", help="actions of a chunk (%(default)s)")
     parser.add_argument("--denoise", type=int, default=10, metavar="N", help="steps of DDIM (%(default)s)")
     parser.add_argument(
-        "--noise", type=float, default=0.5, metavar="STD", help="of which chunks are made; 1 as in training (%(default)g)"
+        "--noise",
+        type=float,
+        default=0.5,
+        metavar="STD",
+        help="of which chunks are made; 1 as in training (%(default)g)",
     )
     parser.add_argument("--max-steps", type=int, default=300, metavar="N", help="actions of a scene (%(default)s)")
     parser.add_argument(
@@ -63,10 +70,7 @@ def run(args: argparse.Namespace) -> int:
     seeds = range(HELD_OUT, HELD_OUT + args.scenes)
     more = {name: getattr(args, name) for name in ("region", "execute", "denoise", "noise", "max_steps")}
     folder = args.out / "rollouts"
-    work = {
-        _file(folder, piece): piece
-        for piece in pieces(policies, rules, seeds, robot=robot, **more)
-    }
+    work = {_file(folder, piece): piece for piece in pieces(policies, rules, seeds, robot=robot, **more)}
     left = [piece for file, piece in work.items() if not _done(file, piece)]
     names = {piece: file for file, piece in work.items()}
     with output.progress("learn evaluate") as progress, executor(args) as (pool, jobs):
@@ -82,9 +86,7 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def pieces(
-    policies: Sequence[str], rules: Sequence[str], seeds: Sequence[int], **more: object
-) -> list[Piece]:
+def pieces(policies: Sequence[str], rules: Sequence[str], seeds: Sequence[int], **more: object) -> list[Piece]:
     """All scenes of all policies under all rules. "default" is the library's rule. more: of `Piece`."""
     return [
         Piece(policy, None if rule == "default" else rule, tuple(seeds[k : k + _EACH]), **more)  # type: ignore[arg-type]

@@ -24,9 +24,11 @@ _SIGMA = LogNorm(1e-3, 0.2)
 
 
 def results_figure(files: Sequence[Rollouts], rows: Sequence[Summary]) -> Figure:
-    """Phases that are passed for each rule; trajectories coloured by σ_min/σ_max; asked and achieved speed of a scene."""
+    """Phases that are passed for each rule; trajectories coloured by σ_min/σ_max; a scene's speeds."""
     shown = _shown(rows)
-    groups = {rule: rollouts for (policy, rule, region), rollouts in grouped(files).items() if (policy, region) == shown}
+    groups = {
+        rule: rollouts for (policy, rule, region), rollouts in grouped(files).items() if (policy, region) == shown
+    }
     rules = [row.rule for row in rows if (row.policy, row.region) == shown]
     name = "all policies" if shown[0] == ALL_SEEDS else shown[0]
     figure = empty_figure(12.0, 7.2, f"{name}, {shown[1]}: {len(groups[rules[0]])} scenes for each rule")

@@ -27,7 +27,11 @@ class NoiseNet(nn.Module):
         self._levels = hidden // 2
         self.level = nn.Sequential(nn.Linear(self._levels, hidden), nn.Mish(), nn.Linear(hidden, hidden))
         self.observation = nn.Sequential(
-            nn.Linear(seen, 2 * hidden), nn.Mish(), nn.Linear(2 * hidden, 2 * hidden), nn.Mish(), nn.Linear(2 * hidden, hidden)
+            nn.Linear(seen, 2 * hidden),
+            nn.Mish(),
+            nn.Linear(2 * hidden, 2 * hidden),
+            nn.Mish(),
+            nn.Linear(2 * hidden, hidden),
         )
         known = 2 * hidden
         widths = (width, *channels)

@@ -80,8 +80,8 @@ class Policy:
         """(B, H, WIDTH) pose actions in the base, the first one for the observations, states (B, S).
 
         noise: (B, H, WIDTH) of a normal distribution, which alone decides among the ways that demonstrations show; a
-        smaller standard deviation gives ways nearer to the most likely one. steps: of DDIM. The gripper's command is the
-        nearer one of 0 and 1, as demonstrations have no others.
+        smaller standard deviation gives ways nearer to the most likely one. steps: of DDIM. The gripper's command is
+        the nearer one of 0 and 1, as demonstrations have no others.
         """
         scaled = torch.from_numpy((features(states) - self.scale.seen_mean) / self.scale.seen_std)
         self.network.eval()
@@ -142,5 +142,3 @@ def load_file(file: str | pathlib.Path, kind: str) -> dict[str, Any]:
     if found != kind:
         raise sk.Error(f"{file} is '{found}', not '{kind}'")
     return dict(state)
-
-

@@ -33,8 +33,9 @@ def action_columns(action: Action) -> list[str]:
 def pieces(recording: Recording, name: str, fps: float, action: Action) -> Iterator[Episode]:
     """Episodes at the rate `fps` [Hz], one for each span of the recording without a gap of its clock.
 
-    A span ends where cycles are missing, where the arm was started again at another place, and where the clock went on by
-    more than a frame. Spans of less than two frames are left out. An action "twist" is the mean of the asked twist over
+    A span ends where cycles are missing, where the arm was started again at another place, and where the clock went on
+    by more than a frame. Spans of less than two frames are left out. An action "twist" is the mean of the asked twist
+    over
     the frame, "pose" the tool at the frame's end. The phase is the command ("pose", "twist", "hold", "stale"), or
     "changing_branch" while the guide leads the arm another way than the command. A recording does not say whether it
     succeeded: `success` is False.

@@ -1,7 +1,7 @@
 """Lets a policy or the demonstrator drive held-out scenes under a rule, and keeps what the arm did.
 
-All scenes of a piece step together in a `FetchVector`. A piece of work is a `Piece`: it can be pickled, so that an executor
-may run it anywhere.
+All scenes of a piece step together in a `FetchVector`. A piece of work is a `Piece`: it can be pickled, so that an
+executor may run it anywhere.
 """
 
 from __future__ import annotations
@@ -192,9 +192,7 @@ def load_rollouts(file: pathlib.Path) -> Rollouts:
             one_more = np.arange(1, len(ends)) if name in ("tool", "sigma") else 0
             parts[name] = np.split(arrays[name], ends[:-1] + one_more)
         found = [
-            Rollout(
-                **{name: arrays[name][k].item() for name in _NUMBERS}, **{name: parts[name][k] for name in _SERIES}
-            )
+            Rollout(**{name: arrays[name][k].item() for name in _NUMBERS}, **{name: parts[name][k] for name in _SERIES})
             for k in range(len(ends))
         ]
     except (KeyError, TypeError, ValueError, EOFError) as error:

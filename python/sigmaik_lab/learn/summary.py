@@ -38,7 +38,7 @@ class Summary:
 
 
 def grouped(files: Iterable[Rollouts]) -> dict[tuple[str, str, str], list[Rollout]]:
-    """(policy, rule, region) to the rollouts, those of all trained policies together after them where there are several."""
+    """(policy, rule, region) to the rollouts; where there are several trained policies, then those of all together."""
     groups: dict[tuple[str, str, str], dict[int, Rollout]] = {}
     for done in files:
         piece = done.piece

@@ -2,8 +2,8 @@
 
 A run that was interrupted ends with the same weights, to the bit, on the same number of threads.
 
-The learning rate rises over the first steps and falls as a cosine to zero at the last; a mean of the weights of all steps
-(EMA) is the policy, and not the last step's weights (both as in Chi et al. 2023).
+The learning rate rises over the first steps and falls as a cosine to zero at the last; a mean of the weights of all
+steps (EMA) is the policy, and not the last step's weights (both as in Chi et al. 2023).
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ _HELD_OUT = 20
 class Training:
     """How a policy is trained."""
 
-    steps: int = 4000
+    steps: int = 2500
     batch: int = 256
     rate: float = 1e-3  #: largest learning rate
     decay: float = 1e-4  #: of weights
@@ -196,7 +196,10 @@ class Trainer:
         mine = self._facts()
         for name, value in mine.items():
             if state["facts"].get(name) != value:
-                raise sk.Error(f"the checkpoint is of another {name}: {state['facts'].get(name)}, not {value}")
+                raise sk.Error(
+                    f"the checkpoint is of another {name} ({state['facts'].get(name)}, not {value})"
+                    "; --fresh trains anew"
+                )
         self.policy = Policy.of(state["policy"])
         self.network.load_state_dict(state["network"])
         self.optimizer.load_state_dict(state["optimizer"])

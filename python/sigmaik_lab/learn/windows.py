@@ -26,8 +26,8 @@ FEATURES = 2 * 3 * (1 + len(_SCALES)) + 3 + 6 + 2
 def features(states: Floats) -> Floats:
     """(…, FEATURES) of states (…, S).
 
-    The offsets tool → cup and cup → goal in the tool's axes, in metres and saturated by tanh at 2 cm and 10 cm, so that a
-    network can tell millimetres at the cup; the tool's position and rotation in the base; opening; σ_min/σ_max.
+    The offsets tool → cup and cup → goal in the tool's axes, in metres and saturated by tanh at 2 cm and 10 cm, so that
+    a network can tell millimetres at the cup; the tool's position and rotation in the base; opening; σ_min/σ_max.
     """
     parts = layout((states.shape[-1] - layout(0).size) // 2)
     values = states.astype(np.float64)
@@ -65,8 +65,8 @@ def absolute_chunks(states: Floats, chunks: Floats) -> Floats:
 
 
 def windows(episodes: Sequence[Episode], horizon: int) -> tuple[Floats, Floats]:
-    """Features (N, FEATURES) and chunks (N, horizon, WIDTH) of every frame of all episodes; after an episode's end its last
-    action stands.
+    """Features (N, FEATURES) and chunks (N, horizon, WIDTH) of every frame of all episodes; after an episode's end its
+    last action stands.
 
     A policy sees one observation, and not the one before: from two it learns to stand still where it stood still, as a
     demonstrator does in a pause.
