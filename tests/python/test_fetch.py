@@ -290,6 +290,24 @@ def test_stopping_at_singularities_gets_no_cup_and_the_default_rule_gets_them_al
     assert not sum(end["limits_broken"] for end in ours + stop)
 
 
+def test_stop_stands_before_the_singularity_and_leaves_it_again():
+    def condition(env):
+        return np.linalg.cond(env.task.chain.jacobian(env.world.q[0]))
+
+    kappa = {}
+    for rule in (None, "stop"):
+        env = Fetch(rule=rule, dt=FAST)
+        env.reset(seed=0)
+        hold(env, env.task.hold(env.task.cup), 1.0, 60)
+        kappa[rule] = condition(env)
+    assert 27.0 < kappa["stop"] < 31.0
+    assert kappa[None] > 40.0
+    *_, info = hold(env, env.task.hold(env.task.cup), 1.0, 1)
+    assert np.linalg.norm(info["achieved_twist"]) < 1e-3
+    hold(env, env.task.hold(env.task.cup - [0.15, 0.0, 0.0]), 1.0, 20)
+    assert condition(env) < 20.0
+
+
 def test_twists_and_the_overhead_region_are_done_too():
     assert sum(end["success"] for end in play(size=8, action="twist", dt=FAST)) == 8
     assert sum(end["success"] for end in play(size=8, region="overhead", dt=FAST)) == 8

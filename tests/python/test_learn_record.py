@@ -74,5 +74,18 @@ def test_the_command_tells_what_was_tried_and_where_it_is(tmp_path, capsys):
     assert "has 2 demonstrations already" in " ".join(capsys.readouterr().out.split())
     assert main(["learn", "record", "--episodes", "0"]) == 2
     assert main(["learn", "record", "--rule", "nothing"]) == 2
-    assert main([*words, "--out", str(tmp_path / "b"), "--rule", "stop", "--episodes", "1"]) == 2
-    assert "demonstrations failed" in capsys.readouterr().err
+
+
+def test_a_demonstrator_that_always_fails_is_given_up(tmp_path):
+    with pytest.raises(ValueError, match="5 of 5 demonstrations failed; .* keeps the 0 others"):
+        record(Scenes(rule="stop", max_steps=10), tmp_path, 1, 0, "scripted", Silent())
+
+
+def test_speed_tells_actions_and_cycles_a_second(capsys):
+    words = ["learn", "speed", "--envs", "2", "--threads", "1", "--seconds", "0.1"]
+    assert main([*words, "--cycle", "10"]) == 0
+    *_, last = capsys.readouterr().out.strip().splitlines()
+    cycle, envs, threads, actions, cycles, *_ = map(float, last.split())
+    assert (cycle, envs, threads) == (10.0, 2.0, 1.0)
+    assert cycles == pytest.approx(10.0 * actions, rel=0.01)
+    assert main([*words, "--cycle", "ten"]) == 2

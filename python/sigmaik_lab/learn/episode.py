@@ -97,18 +97,17 @@ def columns(names: Sequence[str], prefix: str) -> list[int]:
     return [k for k, name in enumerate(names) if name.startswith(prefix)]
 
 
-def rotation_6d(rotation: Array) -> Array:
+def rotation_6d(rotation: NDArray[np.floating[Any]]) -> NDArray[Any]:
     """(…, 6) the first two columns of rotation matrices (…, 3, 3)."""
     return np.concatenate([rotation[..., :, 0], rotation[..., :, 1]], axis=-1)
 
 
-def rotation_of_6d(six: Array) -> Array:
+def rotation_of_6d(six: NDArray[np.floating[Any]]) -> Array:
     """(…, 3, 3) the rotation matrices whose first two columns are nearest in the sense of Gram and Schmidt.
 
     Where the six numbers span no plane, other columns take their place, so that the answer is always a rotation.
     """
-    six = np.asarray(six, dtype=np.float64)
-    first, second = six[..., :3], six[..., 3:]
+    first, second = np.split(np.asarray(six, dtype=np.float64), 2, axis=-1)
     x = _unit(first, np.array([1.0, 0.0, 0.0]))
     second = second - np.sum(x * second, axis=-1, keepdims=True) * x
     # Of two axes at right angles, at most one is near x.

@@ -124,6 +124,16 @@ def _add_gripper(spec: Any, flange: Any, tip: Array) -> None:
         conaffinity=0,
         mass=0.0,
     )
+    flange.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_BOX,
+        pos=tip[:3, 3] - 0.05 * tip[:3, 2],
+        quat=quaternion(tip[:3, :3]),
+        size=[_TIP[0], 0.5 * GRIPPER.stroke + 2.0 * _TIP[1], 0.008],
+        rgba=_DARK,
+        contype=0,
+        conaffinity=0,
+        mass=0.0,
+    )
     for side, name in ((1.0, "left"), (-1.0, "right")):
         finger = flange.add_body(
             name=name,
@@ -196,7 +206,7 @@ def _add_cup(world: Any) -> None:
 
 def _add_view(task: Task, spec: Any) -> None:
     """A light, and a camera that sees both discs and the arm."""
-    look = (task.cup + task.goal + np.array([0.0, 0.0, 0.4 * task.reach])) / 3.0
+    look = (task.cup + task.goal + np.array([0.2, 0.0, 0.4]) * task.reach) / 3.0
     eye = look + task.reach * np.array([0.4, -1.5, 0.8])
     back = (eye - look) / np.linalg.norm(eye - look)
     right = np.cross([0.0, 0.0, 1.0], back)
