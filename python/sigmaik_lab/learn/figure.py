@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from sigmaik._plotting import JOINT_COLOURS, empty_figure, plain_axes
 
@@ -64,12 +65,13 @@ def _phases(axes: Axes, rows: Sequence[Summary]) -> None:
 
 def _trajectories(axes: Axes, rollouts: Sequence[Rollout], rule: str) -> LineCollection:
     """Tool positions from above."""
-    pieces, colours = [], []
+    pieces: list[NDArray[np.float32]] = []
+    colours = []
     for rollout in rollouts[:_DRAWN]:
         points = rollout.tool[:, :2]
-        pieces.append(np.stack([points[:-1], points[1:]], axis=1))
+        pieces.extend(np.stack([points[:-1], points[1:]], axis=1))
         colours.append(0.5 * (rollout.sigma[:-1] + rollout.sigma[1:]))
-    lines = LineCollection(np.concatenate(pieces), cmap="viridis", norm=_SIGMA, linewidths=0.8)
+    lines = LineCollection(pieces, cmap="viridis", norm=_SIGMA, linewidths=0.8)
     lines.set_array(np.concatenate(colours))
     axes.add_collection(lines)
     axes.autoscale()

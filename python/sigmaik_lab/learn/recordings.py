@@ -35,8 +35,7 @@ def pieces(recording: Recording, name: str, fps: float, action: Action) -> Itera
 
     A span ends where cycles are missing, where the arm was started again at another place, and where the clock went on
     by more than a frame. Spans of less than two frames are left out. An action "twist" is the mean of the asked twist
-    over
-    the frame, "pose" the tool at the frame's end. The phase is the command ("pose", "twist", "hold", "stale"), or
+    over the frame, "pose" the tool at the frame's end. The phase is the command ("pose", "twist", "hold", "stale"), or
     "changing_branch" while the guide leads the arm another way than the command. A recording does not say whether it
     succeeded: `success` is False.
     """

@@ -192,7 +192,7 @@ def load_rollouts(file: pathlib.Path) -> Rollouts:
             one_more = np.arange(1, len(ends)) if name in ("tool", "sigma") else 0
             parts[name] = np.split(arrays[name], ends[:-1] + one_more)
         found = [
-            Rollout(**{name: arrays[name][k].item() for name in _NUMBERS}, **{name: parts[name][k] for name in _SERIES})
+            Rollout(*(arrays[name][k].item() for name in _NUMBERS), *(parts[name][k] for name in _SERIES))
             for k in range(len(ends))
         ]
     except (KeyError, TypeError, ValueError, EOFError) as error:

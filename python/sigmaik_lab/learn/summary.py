@@ -54,19 +54,21 @@ def grouped(files: Iterable[Rollouts]) -> dict[tuple[str, str, str], list[Rollou
 
 
 def summarize(key: tuple[str, str, str], rollouts: Sequence[Rollout]) -> Summary:
-    passed = [sum(r.reached > k for r in rollouts) for k in range(len(PHASES))]
+    approach, grasp, carry = (sum(r.reached > k for r in rollouts) for k in range(len(PHASES) - 1))
     times = [r.steps / FPS for r in rollouts if r.success]
     apart = np.concatenate([r.asked[:, :3] - r.achieved[:, :3] for r in rollouts])
     return Summary(
         *key,
-        len(rollouts),
-        *passed[:-1],
-        sum(r.success for r in rollouts),
-        sum(r.lost for r in rollouts),
-        sum(r.limits_broken for r in rollouts),
-        float(np.median(times)) if times else math.nan,
-        float(np.sqrt(np.mean(np.sum(apart**2, axis=1)))),
-        float(np.median([r.sigma.min() for r in rollouts])),
+        scenes=len(rollouts),
+        approach=approach,
+        grasp=grasp,
+        carry=carry,
+        place=sum(r.success for r in rollouts),
+        lost=sum(r.lost for r in rollouts),
+        limits_broken=sum(r.limits_broken for r in rollouts),
+        median_time=float(np.median(times)) if times else math.nan,
+        lag=float(np.sqrt(np.mean(np.sum(apart**2, axis=1)))),
+        least_sigma=float(np.median([r.sigma.min() for r in rollouts])),
     )
 
 
