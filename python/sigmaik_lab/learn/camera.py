@@ -18,8 +18,11 @@ __all__ = ["Camera"]
 class Camera:
     """Draws environment b of a world."""
 
-    def __init__(self, task: Task, size: int) -> None:
-        """size: pixels of a side. OSError where no OpenGL is found; the text says what to install."""
+    def __init__(self, task: Task, size: int, shadows: bool) -> None:
+        """size: pixels of a side. shadows: they take nine tenths of the time where OpenGL is software.
+
+        OSError where no OpenGL is found; the text says what to install.
+        """
         choose_opengl()
         import mujoco  # type: ignore[import-untyped]
 
@@ -32,6 +35,7 @@ class Camera:
                 f"MuJoCo finds no OpenGL ({error}); set MUJOCO_GL=egl before mujoco is imported. On Debian or Ubuntu "
                 "`apt install libegl1 libgl1-mesa-dri` brings one that needs no GPU"
             ) from error
+        self._renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = shadows
 
     def picture(self, world: World, b: int) -> NDArray[np.uint8]:
         """(size, size, 3) RGB."""

@@ -122,7 +122,7 @@ class Fetch(gymnasium.Env[Observation, NDArray[np.float32]]):
         from .camera import Camera
 
         if size not in self._cameras:
-            self._cameras[size] = Camera(self.task, size)
+            self._cameras[size] = Camera(self.task, size, shadows=size == _PICTURE)
         picture: NDArray[np.uint8] = self._cameras[size].picture(self.world, 0)
         return picture
 
