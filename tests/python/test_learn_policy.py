@@ -204,9 +204,9 @@ def test_a_checkpoint_of_another_run_is_refused(tmp_path, changes, said):
 
 def test_a_policy_learns_to_go_to_the_cup():
     episodes = [reach(k) for k in range(40)]
-    shape = Shape(horizon=8, channels=(32, 32), hidden=32, levels=20)
-    found = Trainer("ufactory_xarm7", episodes, Training(300, 64, 3e-3), shape)
-    policy = found.run(every=100)
+    shape = Shape(horizon=8, channels=(16, 32), hidden=32, levels=20)
+    found = Trainer("ufactory_xarm7", episodes, Training(250, 64, 3e-3), shape)
+    policy = found.run(every=50)
     assert found.losses[-1].held_out < 0.5 * found.losses[0].held_out
     test = reach(99)
     rng = np.random.default_rng(0)

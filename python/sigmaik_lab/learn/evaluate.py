@@ -106,8 +106,11 @@ def _check(policies: Sequence[str], rules: Sequence[str], execute: int) -> str:
         if policy == DEMONSTRATOR:
             continue
         need("torch")
+        import torch
+
         from .policy import load_policy
 
+        torch.set_num_threads(1)  # processes that are forked later would wait for this one's threads
         found = load_policy(policy)
         if execute > found.shape.horizon:
             raise ValueError(f"--execute is at most {found.shape.horizon}, the actions of a chunk of {policy}")
