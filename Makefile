@@ -102,6 +102,7 @@ build/release/build.ninja: CMakePresets.json | system
 .venv/.build .venv/.demo .venv/.docs .venv/.test .venv/.bench: .venv/.%: .venv/pyvenv.cfg pyproject.toml tools/requirements.py
 	$(BIN)/python tools/requirements.py $* > .venv/$*.txt
 	$(BIN)/python -m pip install -q --no-compile -r .venv/$*.txt
+	$(if $(filter test,$*),@tools/install_torch.sh $(BIN)/python)
 	@touch $@
 
 .venv/.package: $(SOURCES) pyproject.toml README.md LICENSE .venv/.build | system

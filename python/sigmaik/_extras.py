@@ -10,8 +10,10 @@ __all__ = ["MissingPackage", "installed", "need"]
 
 #: pip's requirement for a module, where the requirement differs from the module's name.
 _REQUIREMENTS = {
+    "gymnasium": "'gymnasium>=1'",
     "distributed": "'dask[distributed]'",
     "mujoco": "'mujoco>=3'",
+    "PIL": "pillow",
     "optik": "optik-py",
     "placo": "'placo>=0.10'",
     "rclpy": "ros-rclpy ros-rmw-fastrtps-cpp ros-diagnostic-msgs ros-geometry-msgs ros-sensor-msgs ros-std-srvs "

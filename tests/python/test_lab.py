@@ -32,6 +32,8 @@ EXTRAS = (
     "viser",
     "yourdfpy",
     "pyarrow",
+    "gymnasium",
+    "torch",
     "distributed",
     "pygame",
     "rclpy",
@@ -81,7 +83,7 @@ def test_all_commands_are_found():
         "arrival", "axis5", "cart", "drill", "execute", "limits", "montecarlo", "reach", "reaching", "round-table",
         "solvers", "stress", "track",
     }  # fmt: skip
-    assert set(study.names()) - set(STUDIES) == {"info", "robots", "ros2", "ros2-arm", "teleop"}
+    assert set(study.names()) - set(STUDIES) == {"info", "learn", "robots", "ros2", "ros2-arm", "teleop"}
     for name in study.names():
         first, rest = study.describe(name)
         assert 10 < len(first) < 80

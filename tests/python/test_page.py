@@ -81,7 +81,7 @@ class Browser:
 @contextlib.contextmanager
 def opened_page(directory):
     with Session("ur10", rate=250.0, pose_timeout=60.0) as session:
-        page = Page(session, port=0, directory=directory, parquet=False)
+        page = Page(session, port=0, directory=directory)
         until(lambda: session.latest is not None)
         yield page
         page.close()
@@ -231,12 +231,12 @@ def test_a_websocket_of_the_page_itself_is_let_through(page, browsers):
 def test_a_taken_port_is_an_error(page, tmp_path, capsys):
     port = urlsplit(page.url).port
     with Session("ur10") as session, pytest.raises(sk.Error, match=f"cannot listen on port {port}"):
-        Page(session, port=port, directory=tmp_path, parquet=False)
+        Page(session, port=port, directory=tmp_path)
     assert main(["teleop", "--port", str(port), "--robot", "ur10", "--out", str(tmp_path)]) == 2
     assert f"port {port}" in capsys.readouterr().err
     for host in ("no.such.host.invalid", "203.0.113.1", "\ud800"):
         with Session("ur10") as session, pytest.raises(sk.Error, match="cannot listen on"):
-            Page(session, host=host, port=0, directory=tmp_path, parquet=False)
+            Page(session, host=host, port=0, directory=tmp_path)
 
 
 # --- one driver, a latched stop
@@ -413,7 +413,7 @@ class Recorded(page.Page):
         print("recording", flush=True)
 
 page.Page = Recorded
-sys.exit(main(["teleop", "--robot", "ur10", "--rate", "250", "--port", "0", "--no-parquet", "--out", sys.argv[1]]))
+sys.exit(main(["teleop", "--robot", "ur10", "--rate", "250", "--port", "0", "--out", sys.argv[1]]))
 """
 
 
@@ -431,7 +431,7 @@ def test_a_recording_of_the_command_survives_its_end(tmp_path, end):
         (part,) = journal.cut_off(tmp_path)
         recorded = len(Episode.load(part))
         with Session("ur10") as session:  # the next run of the page
-            page = Page(session, port=0, directory=tmp_path, parquet=False)
+            page = Page(session, port=0, directory=tmp_path)
             until(lambda: page._controls.episodes.options == ("episode-0000.npz",))
             page.close()
         assert not part.exists()
@@ -615,7 +615,7 @@ def test_the_page_of_an_arm_with_a_mesh_from_elsewhere_is_refused(folders, mesh,
     urdf.write_text(ARM.format(mesh=mesh))
     before = {thread for thread in sys._current_frames()}
     with Session(str(urdf)) as session, pytest.raises(sk.Error, match="outside .*--package NAME=FOLDER"):
-        Page(session, port=0, directory=folders, parquet=False)
+        Page(session, port=0, directory=folders)
     until(lambda: len(set(sys._current_frames()) - before) <= 1)
     assert main(["teleop", "--robot", str(urdf), "--port", "0", "--out", str(folders)]) == 2
     errors = capsys.readouterr().err
@@ -641,7 +641,7 @@ def test_meshes_of_the_own_folder_and_of_packages_are_read(folders):
         MeshFiles(arm / "arm.urdf", {"none": folders / "none"})
     (arm / "arm.urdf").write_text(ARM.format(mesh="meshes/m.stl"))
     with Session(str(arm / "arm.urdf")) as session:
-        page = Page(session, port=0, directory=folders, parquet=False)
+        page = Page(session, port=0, directory=folders)
         assert page._scene.robot.missing == []
         page.close()
 
@@ -651,4 +651,4 @@ def test_a_broken_mesh_is_refused_with_its_name(folders):
     urdf.write_text(ARM.format(mesh="broken.dae"))
     (folders / "arm" / "broken.dae").write_bytes(bytes(itertools.islice(itertools.cycle(b"\x00\xff"), 200)))
     with Session(str(urdf)) as session, pytest.raises(sk.Error, match="cannot be drawn"):
-        Page(session, port=0, directory=folders, parquet=False)
+        Page(session, port=0, directory=folders)

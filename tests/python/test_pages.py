@@ -14,6 +14,7 @@ PAGES = [
         "docs/position_ik.md",
         "docs/batches.md",
         "docs/action_chunks.md",
+        "docs/learning.md",
     )
     if (ROOT / page).exists()
 ]

@@ -265,8 +265,7 @@ def test_a_dense_recording_is_saved_so_that_it_loads(episode, tmp_path, monkeypa
 # --- the clock
 
 
-def test_timestamps_are_the_loops_clock_and_gaps_are_seen(episode, tmp_path):
-    parquet = pytest.importorskip("pyarrow.parquet")
+def test_gaps_of_the_loops_clock_are_seen(episode):
     clock = episode["time"][0] + episode.dt * np.arange(len(episode))
     clock[50:] += 0.25  # the loop left out cycles
     clock[120:] += 12.0
@@ -274,14 +273,9 @@ def test_timestamps_are_the_loops_clock_and_gaps_are_seen(episode, tmp_path):
     cycle[80:] += 30  # cycles that nobody read
     clock[80:] += 30 * episode.dt
     late = changed(episode, time=clock, cycle=cycle)
-    table = parquet.read_table(late.save_parquet(tmp_path / "late.parquet"))
-    stamps = table["timestamp"].to_numpy()
-    np.testing.assert_array_equal(stamps, clock - clock[0])
     assert [gap.row for gap in late.gaps] == [50, 80, 120]
     assert [gap.lost for gap in late.gaps] == [0, 30, 0]
     np.testing.assert_allclose([gap.seconds for gap in late.gaps], [0.25, 30 * episode.dt, 12.0])
-    assert table.schema.metadata[b"gaps"] == b"3"
-    assert float(table.schema.metadata[b"gap_seconds"]) == pytest.approx(12.25 + 30 * episode.dt)
     assert late.duration == pytest.approx(clock[-1] - clock[0] + episode.dt)
 
 

@@ -256,24 +256,6 @@ def test_broken_limits_are_counted(episode):
     assert broken == {"position": 1, "velocity": 1, "acceleration": 2}
 
 
-def test_parquet_columns(episode, tmp_path):
-    parquet = pytest.importorskip("pyarrow.parquet")
-    table = parquet.read_table(episode.save_parquet(tmp_path / "e.parquet", 7))
-    assert table.num_rows == len(episode)
-    columns = {name: np.array(table[name].to_pylist()) for name in table.column_names}
-    np.testing.assert_array_equal(columns["timestamp"], episode["time"] - episode["time"][0])
-    np.testing.assert_array_equal(columns["frame_index"], np.arange(len(episode)))
-    assert set(columns["episode_index"]) == {7}
-    np.testing.assert_allclose(columns["observation.state"], episode["q"], atol=1e-6)
-    np.testing.assert_allclose(columns["observation.velocity"], episode["qdot"], atol=1e-5)
-    np.testing.assert_allclose(columns["action"], episode["asked_twist"], atol=1e-6)
-    np.testing.assert_allclose(columns["pose"].reshape(-1, 4, 4), episode["pose"], atol=1e-6)
-    assert set(columns["guide"]) <= {state.name.lower() for state in sk.GuideState}
-    assert set(columns["status"]) <= {status.name.lower() for status in sk.Status}
-    assert set(columns["command"]) == {"pose", "twist", "stale", "hold"} & set(columns["command"])
-    assert json.loads(table.schema.metadata[b"sigmaik"])["robot"] == "ufactory_xarm7"
-
-
 def test_what_is_no_recording_is_refused(tmp_path):
     (tmp_path / "text.npz").write_text("not a zip")
     np.savez(tmp_path / "other.npz", a=np.zeros(3))

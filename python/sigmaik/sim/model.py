@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,17 @@ from numpy.typing import ArrayLike
 from sigmaik import _core
 from sigmaik._types import Array
 
-__all__ = ["build"]
+__all__ = ["ArmSpec", "add_body", "arm_spec", "build", "compiled", "quaternion"]
+
+
+@dataclass
+class ArmSpec:
+    """A mujoco.MjSpec of an arm, to which bodies can be added before it is compiled."""
+
+    spec: Any
+    bodies: list[Any]  #: one for each movable joint, from the base on
+    tip: Array  #: (4, 4) the chain's tip in the last body
+    inertias: list[list[tuple[_core.Inertia, Array]]]  #: of the bodies, each with its frame in the body
 
 
 def build(
@@ -25,7 +36,27 @@ def build(
     gravity: ArrayLike,
     timestep: float,
 ) -> Any:
-    """A mujoco.MjModel: a body for each movable joint with all links that move with the joint, and one for the payload.
+    """A mujoco.MjModel of an arm in free space, with a body for the payload; arguments as for `arm_spec`."""
+    import mujoco  # type: ignore[import-untyped]
+
+    arm = arm_spec(chain, gain, effort, stops, joints, gravity, timestep)
+    arm.spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
+    if payload is not None and payload.mass > 0.0:
+        add_body(arm.bodies[-1], "payload", arm.tip)
+        arm.inertias.append([(payload, np.eye(4))])
+    return compiled(arm)
+
+
+def arm_spec(
+    chain: _core.Chain,
+    gain: Array | None,
+    effort: Array,
+    stops: bool,
+    joints: dict[str, Array],
+    gravity: ArrayLike,
+    timestep: float,
+) -> ArmSpec:
+    """A body for each movable joint with all links that move with the joint, and a site "tip".
 
     gain: (n,) K_v of the velocity loops [N·m·s/rad]; None: the drives are torque motors
     effort: (n,) limits of the drives [N·m or N]
@@ -34,7 +65,7 @@ def build(
     gravity: (3,) [m/s²] in base axes
     timestep: [s]
     """
-    import mujoco  # type: ignore[import-untyped]
+    import mujoco
 
     if any(segment.mimic is not None for segment in chain.segments):
         raise _core.Error(
@@ -45,37 +76,44 @@ def build(
     spec.option.timestep = timestep
     # The integrator is implicit in the friction, and in the velocity loops while their torque is below the limit.
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    spec.option.disableflags = mujoco.mjtDisableBit.mjDSBL_AUTORESET | mujoco.mjtDisableBit.mjDSBL_CONTACT
+    spec.option.disableflags = mujoco.mjtDisableBit.mjDSBL_AUTORESET
 
     body, place, joint = spec.worldbody, np.eye(4), 0
+    bodies: list[Any] = []
     inertias: list[list[tuple[_core.Inertia, Array]]] = []
     limits = chain.limits
     for segment in chain.segments:
         place = place @ segment.origin
         if segment.type != "fixed":
-            body = _add_body(body, segment.link_name, place)
+            body = add_body(body, segment.link_name, place)
             span = (limits.lower[joint], limits.upper[joint]) if stops else (-math.inf, math.inf)
             _add_joint(body, segment, span, {name: values[joint] for name, values in joints.items()})
             _add_drive(spec, segment.joint_name, None if gain is None else gain[joint], effort[joint])
+            bodies.append(body)
             inertias.append([])
             place, joint = np.eye(4), joint + 1
         if inertias and segment.inertia is not None:
             inertias[-1].append((segment.inertia, place))
-    body.add_site(name="tip", pos=place[:3, 3], quat=_quaternion(place[:3, :3]))
-    if payload is not None and payload.mass > 0.0:
-        _add_body(body, "payload", place)
-        inertias.append([(payload, np.eye(4))])
-    model = spec.compile()
+    body.add_site(name="tip", pos=place[:3, 3], quat=quaternion(place[:3, :3]))
+    return ArmSpec(spec, bodies, place, inertias)
 
-    # MuJoCo's solver accepts inertias that no rigid body can have, such as the published ones of the PUMA, but MuJoCo's
-    # compiler refuses them. The bodies are therefore compiled with other inertias, which are replaced here.
-    for number, parts in enumerate(inertias, start=1):
+
+def compiled(arm: ArmSpec) -> Any:
+    """The mujoco.MjModel, whose first bodies have the inertias of `arm`; other bodies keep those of the spec.
+
+    MuJoCo's solver accepts inertias that no rigid body can have, such as the published ones of the PUMA, but MuJoCo's
+    compiler refuses them. The bodies are therefore compiled with other inertias, which are replaced here.
+    """
+    import mujoco
+
+    model = arm.spec.compile()
+    for number, parts in enumerate(arm.inertias, start=1):
         mass, centre, tensor = _together(parts)
         moments, axes = np.linalg.eigh(tensor)
         axes[:, 2] *= np.linalg.det(axes)
         model.body_mass[number] = mass
         model.body_ipos[number] = centre
-        model.body_iquat[number] = _quaternion(axes)
+        model.body_iquat[number] = quaternion(axes)
         model.body_inertia[number] = moments
     mujoco.mj_setConst(model, mujoco.MjData(model))
     return model
@@ -115,13 +153,14 @@ def _add_drive(spec: Any, joint: str, gain: float | None, effort: float) -> None
         actuator.forcerange = [-effort, effort]
 
 
-def _add_body(parent: Any, name: str, place: Array) -> Any:
+def add_body(parent: Any, name: str, place: Array) -> Any:
+    """A body at a place (4, 4) in its parent, with an inertia that `compiled` replaces."""
     # The inertia has a frame of its own and no principal axes. With simpler values MuJoCo would take short cuts that
     # are wrong for the true inertia, which is set later.
     return parent.add_body(
         name=name,
         pos=place[:3, 3],
-        quat=_quaternion(place[:3, :3]),
+        quat=quaternion(place[:3, :3]),
         mass=1.0,
         ipos=[0.1, 0.2, 0.3],
         fullinertia=[1.0, 1.1, 1.2, 0.1, 0.1, 0.1],
@@ -129,7 +168,7 @@ def _add_body(parent: Any, name: str, place: Array) -> Any:
     )
 
 
-def _quaternion(rotation: Array) -> Array:
+def quaternion(rotation: Array) -> Array:
     """The quaternion wxyz of a rotation, in the order of MuJoCo."""
     import mujoco
 

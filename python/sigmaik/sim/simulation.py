@@ -118,7 +118,7 @@ class Simulation:
         self._speed = speed if velocity_limits else np.full(n, math.inf)
         gain = None
         if actuation == "velocity":
-            gain = bandwidth * (_largest_inertias(chain, gravity) + joints["armature"])
+            gain = bandwidth * (largest_inertias(chain, gravity) + joints["armature"])
         self._gain, self._integral_rate = gain, integral_rate
         self.model = build(chain, gain, self._effort, position_stops, joints, payload, gravity, timestep)
 
@@ -235,7 +235,7 @@ def _check_not_negative(**values: float) -> None:
             raise _core.Error(f"{name} = {value} must be finite and not negative")
 
 
-def _largest_inertias(chain: _core.Chain, gravity: ArrayLike) -> Array:
+def largest_inertias(chain: _core.Chain, gravity: ArrayLike) -> Array:
     """(n,) the largest M_ii in 256 configurations, for the gains of the velocity loops."""
     generator = np.random.default_rng(0)
     dynamics = _core.Dynamics(chain, gravity)

@@ -13,21 +13,12 @@ and joint_names, lower, upper, velocity, acceleration (n,) (the limits that the 
 (q and q̇ before the first cycle), urdf (the arm's text), and meta: JSON with robot, base, tip, dt, settings (a
 configuration's number to its settings) and version.
 
-A recording as a parquet file (extra `viewer`) has a row for each cycle, and columns for tools of imitation learning:
-
-    timestamp [s] of the loop's clock from 0 (late cycles show as gaps), frame_index, episode_index,
-    observation.state (n,) q, observation.velocity (n,) q̇, action (6,) the twist that was asked for [v; ω],
-    pose (16,) the tip's, row by row, command, status, guide (text)
-
-with the same meta in the schema's metadata, and joint_names, gaps (their number) and gap_seconds (their sum).
-
 A recording that goes on is a file `.part`, written by `sigmaik.teleop.journal`; `Episode.load` reads such a file, too.
 """
 
 from __future__ import annotations
 
 import dataclasses
-import enum
 import json
 import pathlib
 from collections.abc import Mapping
@@ -38,7 +29,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 import sigmaik as sk
-from sigmaik._extras import need
 from sigmaik._types import Array
 from sigmaik.files import write_atomically
 
@@ -180,11 +170,6 @@ class Episode:
         """Writes an npz file, whole or not at all. Returns its path."""
         return write_atomically(pathlib.Path(file), self._npz)
 
-    def save_parquet(self, file: str | pathlib.Path, episode_index: int = 0) -> pathlib.Path:
-        """Writes a parquet file, whole or not at all. Returns its path."""
-        need("pyarrow")
-        return write_atomically(pathlib.Path(file), lambda stream: self._parquet(stream, episode_index))
-
     @staticmethod
     def load(file: str | pathlib.Path, largest: int | None = None) -> Episode:
         """Reads an npz file, or the file of a recording that was cut off (`.part`).
@@ -235,42 +220,6 @@ class Episode:
             stream.seek(0)
             stream.truncate()
             np.savez(stream, **arrays)
-
-    def _parquet(self, stream: BinaryIO, episode_index: int) -> None:
-        import pyarrow as pa
-        import pyarrow.parquet as parquet
-
-        n = len(self)
-
-        def vectors(values: NDArray[Any]) -> Any:
-            flat = pa.array(values.reshape(-1).astype(np.float32))
-            return pa.FixedSizeListArray.from_arrays(flat, int(values.size // n))
-
-        def texts(field: str, names: type[enum.IntEnum]) -> Any:
-            return pa.DictionaryArray.from_arrays(self[field].astype(np.int8), [name.name.lower() for name in names])
-
-        table = pa.table(
-            {
-                "timestamp": pa.array(self["time"] - self["time"][0]),
-                "frame_index": pa.array(np.arange(n, dtype=np.int64)),
-                "episode_index": pa.array(np.full(n, episode_index, dtype=np.int64)),
-                "observation.state": vectors(self["q"]),
-                "observation.velocity": vectors(self["qdot"]),
-                "action": vectors(self["asked_twist"]),
-                "pose": vectors(self["pose"]),
-                "command": texts("command", sk.LoopCommand),
-                "status": texts("status", sk.Status),
-                "guide": texts("guide", sk.GuideState),
-            }
-        )
-        gaps = self.gaps
-        meta = {
-            "sigmaik": self._meta(),
-            "joint_names": json.dumps(list(self.arm.chain.joint_names)),
-            "gaps": str(len(gaps)),
-            "gap_seconds": repr(sum(gap.seconds for gap in gaps)),
-        }
-        parquet.write_table(table.replace_schema_metadata(meta), stream)
 
 
 def _from_npz(path: pathlib.Path, largest: int | None) -> Episode:

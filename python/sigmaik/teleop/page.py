@@ -54,7 +54,6 @@ class Page:
         host: str = "127.0.0.1",
         port: int = 8080,
         directory: str | pathlib.Path = "episodes",
-        parquet: bool = True,
         *,
         packages: Mapping[str, str | pathlib.Path] | None = None,
         names: Iterable[str] = (),
@@ -63,15 +62,12 @@ class Page:
         host: the address to listen on; only this machine can reach 127.0.0.1
         port: 0 takes a free port. Error where the port is taken
         directory: of recordings. Recordings that a crash cut off are recovered there
-        parquet: write recordings as parquet, too
         packages: name to folder of ROS packages that the URDF's meshes may come from
         names: further names of this host under which browsers reach the page
         Error where a mesh is outside the URDF's folder and the packages.
         """
         need("viser", "yourdfpy")
-        if parquet:
-            need("pyarrow")
-        self.session, self.recorder = session, Recorder(session, directory, parquet)
+        self.session, self.recorder = session, Recorder(session, directory)
         self._seat = seat.Seat(session)
         self._device: TwistDevice | None = None
         self._device_of: Hashable | None = None  # the driver that the device works for

@@ -30,8 +30,8 @@ class Recorder:
     Any thread may call the functions.
     """
 
-    def __init__(self, session: Session, directory: str | pathlib.Path, parquet: bool) -> None:
-        self.session, self.directory, self.parquet = session, pathlib.Path(directory), parquet
+    def __init__(self, session: Session, directory: str | pathlib.Path) -> None:
+        self.session, self.directory = session, pathlib.Path(directory)
         self._unsaved: list[Unsaved] = []
         self._part: pathlib.Path | None = None
         self._name = ""
@@ -136,14 +136,7 @@ class Recorder:
 
     def _save(self, file: pathlib.Path, episode: Episode) -> str:
         episode.save(file)
-        line = summary(file, episode)
-        if self.parquet:
-            digits = "".join(filter(str.isdigit, file.stem))
-            try:
-                episode.save_parquet(file.with_suffix(".parquet"), int(digits or 0))
-            except OSError as error:  # the npz file has all of it
-                line += f"; without a parquet file: {error.strerror or error}"
-        return line
+        return summary(file, episode)
 
     def _free_stem(self) -> str:
         number, waiting = 0, {unsaved.name for unsaved in self._unsaved}

@@ -62,7 +62,6 @@ def options(parser: argparse.ArgumentParser) -> None:
     page.add_argument("--for", dest="seconds", type=float, metavar="S", help="end after this time (never)")
     out = parser.add_argument_group("recordings")
     out.add_argument("--out", default="episodes", type=pathlib.Path, metavar="DIR", help="(%(default)s)")
-    out.add_argument("--no-parquet", action="store_true", help="npz files only")
     out.add_argument("--replay", type=pathlib.Path, metavar="FILE", help="show this recording (npz) first")
     parser.add_argument(
         "--drill",
@@ -99,9 +98,7 @@ def run(args: argparse.Namespace) -> int:
         pose_timeout=args.browser_timeout,
     )
     with signals_interrupt(), session:
-        page = Page(
-            session, args.host, args.port, args.out, not args.no_parquet, packages=packages, names=tuple(args.name)
-        )
+        page = Page(session, args.host, args.port, args.out, packages=packages, names=tuple(args.name))
         try:
             if args.device is not None:
                 say(f"driving by {page.open_device(args.device)}")
