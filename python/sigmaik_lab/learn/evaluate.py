@@ -79,8 +79,8 @@ def run(args: argparse.Namespace) -> int:
         for done in compute(roll, left, pool, jobs):
             file = save_rollouts(done, names[done.piece])
             good = sum(r.success for r in done.rollouts)
-            progress.say(f"{file.stem}: {good} of {len(done.rollouts)}")
             progress.advance()
+            progress.say(f"{file.stem}: {good} of {len(done.rollouts)}")
     output.say(f"{len(work)} files in {folder}; `sigmaik learn show` makes a table and a picture of them")
     print(folder)
     return 0

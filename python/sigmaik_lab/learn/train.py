@@ -73,8 +73,8 @@ def run(args: argparse.Namespace) -> int:
             pieces = [Piece(str(data), str(files[seed]), seed, args.steps, args.batch, until) for seed in seeds]
             for piece, losses in compute(train, pieces, pool, jobs):
                 told[piece.seed] = losses
-                progress.say(f"seed {piece.seed}, step {losses.step}: noise loss {losses.train:.4f}")
                 progress.advance()
+                progress.say(f"seed {piece.seed}, step {losses.step}: noise loss {losses.train:.4f}")
     table = Table("noise loss (mean square of the noise that is not found)", "policy")
     table.add_numbers("steps", "training", "held out", "s")
     for seed, file in files.items():
