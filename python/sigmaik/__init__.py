@@ -14,7 +14,7 @@ Units are m, rad, s, N·m. Twists and Jacobians are [v; ω], in base axes, at th
 import importlib
 from typing import TYPE_CHECKING
 
-from . import _rules, indices, methods, planning, robots, sim, singularities
+from . import _environments, _rules, indices, methods, planning, robots, sim, singularities
 from ._core import (
     ActionChunks,
     ActionStatus,
@@ -142,6 +142,8 @@ __all__ = [
     "solve_batch",
 ]
 __all__ += _rules.__all__
+
+_environments.register()
 
 
 def __getattr__(name: str) -> object:

@@ -1,12 +1,12 @@
 """Registers the environments with Gymnasium, and imports nothing else. Needs the extra "learn".
 
     import gymnasium
-    import sigmaik_lab.envs
+    import sigmaik                                              # after gymnasium; or sigmaik_lab.envs in any order
 
     env = gymnasium.make("sigmaik/Fetch-v0")                    # or, without our import:
     env = gymnasium.make("sigmaik_lab.envs:sigmaik/Fetch-v0")
 
-Gymnasium looks for no environments by itself since version 1.0, so that one of both is necessary.
+Gymnasium looks for no environments by itself since version 1.0, so that one of these is necessary.
 """
 
 from sigmaik._extras import need

@@ -104,8 +104,12 @@ def test_gymnasiums_checker_finds_nothing(options):
     check_env(env.unwrapped, skip_render_check=True)
 
 
-def test_no_import_of_ours_is_needed_where_the_name_has_the_module():
-    code = "import gymnasium as g; print(g.make('sigmaik_lab.envs:sigmaik/Fetch-v0').reset(seed=1)[0].shape)"
+@pytest.mark.parametrize(
+    ("imports", "prefix"),
+    [("gymnasium", "sigmaik_lab.envs:"), ("gymnasium, sigmaik", ""), ("sigmaik_lab.envs, gymnasium", "")],
+)
+def test_the_environment_is_found(imports, prefix):
+    code = f"import {imports}; print(gymnasium.make('{prefix}sigmaik/Fetch-v0').reset(seed=1)[0].shape)"
     run = subprocess.run([sys.executable, "-W", "ignore", "-c", code], capture_output=True, text=True, check=True)
     assert run.stdout == "(31,)\n"
 
