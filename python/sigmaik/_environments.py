@@ -1,6 +1,6 @@
 """Gymnasium looks for no environments by itself since version 1.0: installed packages register theirs here.
 
-A package names its module in the entry point group "sigmaik.environments", and the module registers when it is imported.
+A package names a module in the entry point group "sigmaik.environments", and the module registers when it is imported.
 """
 
 import sys

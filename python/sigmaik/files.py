@@ -11,7 +11,7 @@ from typing import BinaryIO
 __all__ = ["write_atomically"]
 
 
-def write_atomically(file: pathlib.Path, write: Callable[[BinaryIO], None]) -> pathlib.Path:
+def write_atomically(file: pathlib.Path, write: Callable[[BinaryIO], object]) -> pathlib.Path:
     """Writes a temporary file in the same folder and renames the file, so that nobody ever sees half a file."""
     file.parent.mkdir(parents=True, exist_ok=True)
     handle, name = tempfile.mkstemp(dir=file.parent, prefix=f".{file.name}.")

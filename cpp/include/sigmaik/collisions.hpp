@@ -29,10 +29,10 @@
 ///     - this stop may always be continued (limits.hpp), and the rest of a verified stop is verified;
 ///     - a resting arm is its own stop.
 /// By induction the arm never comes nearer than the margin to anything that rests, whatever the command, from every
-/// start that is at rest outside the margin, and never moves nearer to anything that moves as was told. An obstacle that
-/// comes towards the arm is led away from by the rows, as fast as the joints can, and may be faster. Where the margin
-/// is broken already, or will be, each pair keeps at least the distance that the stop and the rest after it leave in the
-/// time of the command's path.
+/// start that is at rest outside the margin, and never moves nearer to anything that moves as was told. The rows lead
+/// the arm away from an obstacle that comes towards it, as fast as the joints can; an obstacle may be faster. Where
+/// the margin is broken already, or will be, each pair keeps at least the distance that the stop and the rest after it
+/// leave in the time of the command's path.
 ///
 /// A stop is verified at some of its configurations, with a bound of what happens between them. A point of a body has
 /// |∂²x/∂q_i∂q_k| ≤ R_max(i,k), R_k its largest distance from joint k. Between two configurations that differ by Δ, h
