@@ -333,6 +333,46 @@ TEST_CASE("a start inside the margin leads outwards, and no pair comes nearer th
   CHECK(seen >= 6);
 }
 
+TEST_CASE("a ball that comes towards a resting tool, as it was told, is let through: the arm moves away in time") {
+  int frozen = 0, seen = 0;
+  for (const char* name : {"ufactory_xarm7", "franka_panda", "ur10", "kuka_lbr_iiwa_14_r820"}) {
+    const Chain& chain = test::arms().at(name);
+    test::Random random(17);
+    for (int trial = 0; trial < 30; ++trial) {
+      CAPTURE(name);
+      CAPTURE(trial);
+      const JointVector q = test::start_of(random, chain, 0.5);
+      const Pose tip = sigmaik::pose(chain, q);
+      Vector3 direction = random.unit(3);
+      direction = (direction - (trial % 2 == 0 ? 1.0 : 0.5) * direction.z() * Vector3::UnitZ()).normalized();
+      const double speed = random.uniform(0.05, 0.2);
+      Pose ball = Pose::Identity();
+      ball.translation() = tip.translation() - 0.4 * direction;
+      Twist twist = Twist::Zero();
+      twist.head<3>() = speed * direction;
+      Collisions collisions = collisions_of(chain, {Obstacle::sphere(ball.translation(), 0.05)}, 0.02);
+      if (!(collisions.nearest(q).distance > 0.03)) continue;
+      ++seen;
+      ServoOptions options;
+      options.collisions = collisions;
+      Servo servo(chain, sigmaik::JParse{}, options);
+      servo.reset(q);
+      double least = 1.0;
+      for (int i = 0; i < static_cast<int>(0.7 / speed / options.dt); ++i) {
+        ball.translation() += speed * options.dt * direction;
+        collisions.move(0, ball, twist);
+        const ServoStep step = servo.update_twist(Twist::Zero());
+        least = std::min(least, step.clearance);
+        frozen += step.clearance < 0.019 && step.qdot.isZero(0.0) ? 1 : 0;
+      }
+      INFO("least ", least);
+      CHECK(least > 0.015);
+    }
+  }
+  CHECK(frozen == 0);
+  CHECK(seen >= 20);
+}
+
 TEST_CASE("far from everything the command is that of a servo without collisions, to the last digit") {
   const Chain& chain = test::arms().at("ufactory_xarm7");
   const JointVector q = (JointVector(7) << 0.1, -0.6, 0.0, 0.9, 0.1, 1.3, 0.2).finished();
