@@ -147,3 +147,49 @@ PAIR = f"""<robot name="pair"><link name="base"/><link name="x"/><link name="y"/
 <joint name="2" type="prismatic"><parent link="x"/><child link="y"/><axis xyz="0 1 0"/>{LIMIT}</joint>
 <joint name="3" type="revolute"><parent link="y"/><child link="turn"/><axis xyz="1 0 0"/>{LIMIT}</joint>
 <joint name="4" type="revolute"><parent link="turn"/><child link="tool"/><axis xyz="0 1 0"/>{LIMIT}</joint></robot>"""
+
+
+LONG = np.block([[np.eye(3), np.array([[0.0], [0.0], [0.3]])], [np.zeros((1, 3)), np.ones((1, 1))]])
+
+
+def test_a_tool_has_a_body_only_where_one_is_given():
+    before_the_flange = ARM.pose(Q) @ [0.0, 0.0, 0.5, 1.0]
+    ball = sk.Obstacle.sphere(before_the_flange[:3], 0.05)
+    bare, arm = sk.Collisions(ARM, [ball], self_collision=False), ARM.with_tool(LONG)
+    with_tool = sk.Collisions(arm, [ball], self_collision=False)
+    assert with_tool.distance(Q) == bare.distance(Q)
+    stick = sk.Capsule((0, 0, -0.3), (0, 0, 0), 0.03)  # in the tool's frame
+    own = sk.Collisions(
+        arm, [ball], self_collision=False, arm=[*sk.Collisions(arm).capsules, sk.LinkCapsule("tool", stick)]
+    )
+    with_tool.attach([stick])
+    for collisions in (with_tool, own):
+        assert collisions.distance(Q) == pytest.approx(0.5 - 0.3 - 0.05 - 0.03, abs=1e-9)
+    servo = sk.Servo(ARM, collisions=bare)
+    servo.reset(Q)
+    servo.set_tool(LONG)
+    assert servo.hold().clearance == bare.distance(Q)
+    bare.attach([sk.Capsule((0, 0, 0), (0, 0, 0.3), 0.03)])  # in the tip of the chain, with set_tool too
+    assert servo.hold().clearance == pytest.approx(0.12, abs=1e-9)
+
+
+def test_a_servo_with_collisions_takes_cycles_of_its_dt_only():
+    servo = sk.Servo(ARM, collisions=sk.Collisions(ARM))
+    servo.reset(Q)
+    for cycle in (lambda dt: servo.update(servo.pose, dt=dt), lambda dt: servo.update_twist(np.zeros(6), dt=dt)):
+        for bad in (0.9e-3, 2e-3):
+            with pytest.raises(sk.Error, match="a servo with collisions has cycles of its dt"):
+                cycle(bad)
+        assert cycle(1e-3).status == sk.Status.OK
+    with pytest.raises(sk.Error, match="cycles of its dt"):
+        servo.hold(dt=2e-3)
+
+
+def test_an_obstacle_without_a_size_is_refused_with_its_number_and_its_size():
+    for obstacle, fact in [
+        (sk.Obstacle.sphere((1, 1, 1), -1), "radius = -1 m"),
+        (sk.Obstacle.box((1, -2, 1), (1, 1, 1)), "side = -2 m"),
+        (sk.Obstacle.cylinder(0.1, -3, (1, 1, 1)), "length = -3 m"),
+    ]:
+        with pytest.raises(sk.Error, match=f"obstacle 1: {fact} must be finite and above 0"):
+            sk.Collisions(ARM, [sk.Obstacle.sphere((2, 2, 2), 0.1), obstacle])

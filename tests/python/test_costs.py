@@ -1,5 +1,6 @@
 """Costs put together: sums, factors, costs of a user's own, and how planners take them."""
 
+import copy
 import inspect
 import pickle
 
@@ -185,3 +186,13 @@ def test_modules_and_functions_have_names_of_their_own():
     for module in pkgutil.iter_modules(sk.planning.__path__):
         loaded = importlib.import_module(f"sigmaik.planning.{module.name}")
         assert getattr(sk.planning, module.name) is loaded, module.name
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if name != "Collision"])
+def test_a_copy_of_a_term_is_equal(name):
+    one = getattr(costs, name)(weight=2.5)
+    for other in (copy.copy(one), copy.deepcopy(one), pickle.loads(pickle.dumps(one))):
+        assert other == one
+        assert hash(other) == hash(one)
+        assert repr(other) == repr(one)
+        assert repr(other + one) == repr(one + one)

@@ -242,3 +242,17 @@ def test_disabled_pairs(tmp_path):
     ):
         with pytest.raises(sk.Error, match=why):
             sk.models.disabled_pairs(bad)
+
+
+def test_limits_of_an_arm_with_mimic_joints_replace_what_the_mimic_joint_had_imposed():
+    arm = sk.Chain.from_urdf(planar(LIMIT, LIMIT + '<mimic joint="j0" multiplier="4"/>', LIMIT))
+    own = sk.Chain.from_urdf(planar(LIMIT, LIMIT, LIMIT)).limits
+    assert arm.limits.velocity[0] == own.velocity[0] / 4
+    assert arm.limits.upper[0] == own.upper[0] / 4
+    wider = arm.with_limits(velocity=own.velocity[0], upper=own.upper[0])
+    assert wider.limits.velocity[0] == own.velocity[0]
+    assert wider.limits.upper[0] == own.upper[0]
+    assert wider.limits.lower[0] == own.lower[0] / 4  # left out: as it was
+    assert wider.segments[1].mimic == ("j0", 4.0, 0.0)
+    with pytest.raises(sk.Error, match="mimic others; collisions of such arms are not checked"):
+        sk.Collisions(arm)

@@ -1,4 +1,4 @@
-"""The driver and the frames behind the ROS 2 node, without ROS."""
+"""The driver behind the ROS 2 node, without ROS."""
 
 import time
 
@@ -6,25 +6,7 @@ import numpy as np
 import pytest
 
 import sigmaik as sk
-from sigmaik.ros2 import Driver, DriverSettings, Frames
-
-TREE = """<robot name="cell">
-  <link name="world"/><link name="table"/><link name="base"/><link name="upper"/><link name="fore"/>
-  <link name="tip"/><link name="camera"/><link name="finger"/>
-  <joint name="stand" type="fixed"><parent link="world"/><child link="table"/>
-    <origin xyz="1 2 0.5" rpy="0 0 1.5"/></joint>
-  <joint name="mount" type="fixed"><parent link="table"/><child link="base"/>
-    <origin xyz="0.1 0 0.2" rpy="0.3 -0.2 0.1"/></joint>
-  <joint name="j1" type="revolute"><parent link="base"/><child link="upper"/><origin xyz="0 0 0.3" rpy="0.1 0.2 0.3"/>
-    <axis xyz="0 0 2"/><limit lower="-2" upper="2" velocity="2" effort="10"/></joint>
-  <joint name="j2" type="prismatic"><parent link="upper"/><child link="fore"/><origin xyz="0.2 0 0"/><axis xyz="1 1 0"/>
-    <limit lower="-1" upper="1" velocity="1" effort="10"/></joint>
-  <joint name="j3" type="continuous"><parent link="fore"/><child link="tip"/><origin xyz="0.2 0 0.1" rpy="1 0 0"/>
-    <axis xyz="0 1 0"/><limit velocity="2" effort="10"/></joint>
-  <joint name="eye" type="fixed"><parent link="tip"/><child link="camera"/><origin xyz="0 0 0.1" rpy="0 0.4 0"/></joint>
-  <joint name="grip" type="prismatic"><parent link="tip"/><child link="finger"/><axis xyz="0 1 0"/>
-    <limit lower="0" upper="0.1" velocity="1" effort="10"/></joint>
-</robot>"""
+from sigmaik.ros2 import Driver, DriverSettings
 
 
 def wait(condition, seconds=5.0):
@@ -53,45 +35,6 @@ def make(panda, **settings):
     driver.measure(chain.joint_names, home)
     driver.activate()
     return driver
-
-
-@pytest.mark.parametrize("link", ["upper", "fore", "tip"])
-def test_links_of_the_arm_are_where_the_chain_says(link):
-    chain = sk.Chain.from_urdf(TREE, base="base", tip=link)
-    frames = Frames(sk.Chain.from_urdf(TREE, base="base", tip="tip"), TREE)
-    rng = np.random.default_rng(1)
-    for _ in range(100):
-        q = rng.uniform(-1, 1, chain.dof)
-        pose = frames.pose("/" + link, dict(zip(chain.joint_names, q, strict=True)))
-        np.testing.assert_allclose(pose, chain.pose(q), atol=1e-12)
-
-
-def test_every_shipped_arm_has_its_flange_where_the_chain_says():
-    for name in sk.robots.names():
-        chain = sk.robots.load(name)
-        frames = Frames(chain, sk.robots.path(name).read_text(encoding="utf-8"))
-        for seed in range(5):
-            q = chain.random_configuration(seed)
-            pose = frames.pose("flange", dict(zip(chain.joint_names, q, strict=True)))
-            np.testing.assert_allclose(pose, chain.pose(q), atol=1e-9)
-
-
-def test_links_beside_and_above_the_arm_are_frames():
-    chain = sk.Chain.from_urdf(TREE, base="base", tip="tip")
-    frames, q = Frames(chain, TREE), {"j1": 0.3, "j2": -0.2, "j3": 1.0, "grip": 0.05}
-    tip = frames.pose("tip", q)
-    np.testing.assert_allclose(frames.pose("finger", q)[:3, 3], tip[:3, 3] + 0.05 * tip[:3, 1], atol=1e-12)
-    np.testing.assert_allclose(frames.pose("camera", q)[:3, 3], tip[:3, 3] + 0.1 * tip[:3, 2], atol=1e-12)
-    world = frames.pose("world", q)
-    up = sk.Chain.from_urdf(TREE, base="world", tip="tip")
-    np.testing.assert_allclose(world @ up.pose([0.3, -0.2, 1.0]), tip, atol=1e-12)
-    np.testing.assert_allclose(frames.pose("", q), np.eye(4))
-
-
-def test_a_frame_that_is_no_link_is_refused():
-    frames = Frames(sk.Chain.from_urdf(TREE, base="base", tip="tip"), TREE)
-    with pytest.raises(sk.Error, match="no link 'tool'"):
-        frames.pose("tool", {})
 
 
 def test_joints_come_in_any_order_and_with_others_among_them(panda):
@@ -139,10 +82,19 @@ def test_a_pose_in_another_links_frame_is_reached(panda):
     [
         (lambda d: d.twist([np.nan, 0, 0, 0, 0, 0]), "finite"),
         (lambda d: d.twist([1, 0, 0]), "six"),
+        (lambda d: d.twist("abc"), "no array of numbers: 'abc'"),
+        (lambda d: d.twist([0, 0, 0, 0, 0, "fast"]), "no array of numbers"),
+        (lambda d: d.twist([[1, 2], [3]]), "no array of numbers"),
+        (lambda d: d.twist(None), "six"),
+        (lambda d: d.twist(np.zeros(6), None), "name of a link, not None"),
+        (lambda d: d.twist(np.zeros(6), "", np.nan), "age is nan"),
+        (lambda d: d.twist(np.zeros(6), "", np.inf), "age is inf"),
         (lambda d: d.twist(np.zeros(6), "nowhere"), "no link 'nowhere'"),
         (lambda d: d.twist(np.zeros(6), "", 0.2), "0.2 s old"),
         (lambda d: d.twist(np.zeros(6), "", -3.0), "3 s ahead"),
         (lambda d: d.pose(np.eye(3)), "shape"),
+        (lambda d: d.pose("abc"), "no array of numbers: 'abc'"),
+        (lambda d: d.pose({"position": 1}), "no array of numbers"),
         (lambda d: d.pose(np.full((4, 4), np.nan)), "target"),
     ],
 )
@@ -204,7 +156,66 @@ def test_settings_change_during_a_motion_and_bad_ones_change_nothing(panda):
     driver.change(DriverSettings(rate=100.0))
 
 
-@pytest.mark.parametrize("bad", [{"rate": 0.0}, {"timeout": 0.0}, {"timeout": np.inf}, {"method": "x"}])
-def test_settings_out_of_range_are_refused(panda, bad):
-    with pytest.raises(ValueError, match="rate|timeout|x"):
+BAD_SETTINGS = [
+    {"rate": 0.0},
+    {"rate": np.nan},
+    {"timeout": 0.0},
+    {"timeout": -1.0},
+    {"timeout": 60.1},
+    {"timeout": 1000.0},
+    {"timeout": np.nan},
+    {"timeout": np.inf},
+    {"max_following_error": -1.0},
+    {"max_following_error": 0.0},
+    {"max_following_error": np.nan},
+    {"max_following_error": np.inf},
+    {"measure_timeout": -1.0},
+    {"measure_timeout": 0.0},
+    {"measure_timeout": np.nan},
+    {"method": "x"},
+    {"servo": {"gain_linear": -1.0}},
+]
+
+
+@pytest.mark.parametrize("bad", BAD_SETTINGS, ids=str)
+def test_settings_out_of_range_are_refused_at_once_and_change_nothing(panda, bad):
+    name = next(iter(bad))
+    reason = {"method": "'x'", "servo": "gain_linear"}.get(name, f"^{name} = ")
+    with pytest.raises(ValueError, match=reason):
         Driver(panda[0], panda[2], DriverSettings(**bad))
+    driver = Driver(panda[0], panda[2])
+    with pytest.raises(ValueError, match=reason):  # before the arm is active
+        driver.change(DriverSettings(**bad))
+    assert driver.settings == DriverSettings()
+
+
+@pytest.mark.parametrize("bad", [{"timeout": 1000.0}, {"timeout": -1.0}, {"measure_timeout": -1.0}], ids=str)
+def test_an_active_driver_goes_on_after_settings_that_are_out_of_range(panda, bad):
+    driver = make(panda)
+    with pytest.raises(sk.Error, match=next(iter(bad))):
+        driver.change(DriverSettings(**bad))
+    assert driver.twist([0.05, 0, 0, 0, 0, 0])
+    assert driver.deactivate()
+
+
+@pytest.mark.parametrize("good", [{"timeout": 60.0}, {"max_following_error": 1e-3}, {"measure_timeout": 5.0}], ids=str)
+def test_settings_in_range_are_those_of_a_loop_that_starts_and_takes_commands(panda, good):
+    driver = make(panda, **good)
+    assert driver.twist(np.zeros(6))
+    assert driver.deactivate()
+
+
+def test_a_twist_in_the_frame_of_a_tool_moves_along_the_tools_axes(panda):
+    chain, home, text = panda
+    turned = np.eye(4)
+    turned[:3, :3] = sk.rotation_exp([0.9, -0.4, 0.3])
+    turned[:3, 3] = [0.02, 0.0, 0.1]
+    chain = chain.with_tool(turned)
+    driver = make((chain, home, text))
+    begin = chain.pose(home)
+    assert driver.twist([0, 0, 0.1, 0, 0, 0], chain.tip), driver.last_refusal
+    assert wait(lambda: driver.state == sk.LoopState.HOLDING and newest(driver)["cycle"] > 60)
+    moved = chain.pose(newest(driver)["q"])[:3, 3] - begin[:3, 3]
+    assert np.linalg.norm(moved) > 1e-3
+    assert np.dot(moved, begin[:3, 2]) > 0.999 * np.linalg.norm(moved)
+    assert driver.deactivate()

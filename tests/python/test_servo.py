@@ -668,3 +668,17 @@ def test_a_rotation_that_is_one_but_for_rounding_is_taken_and_counted(kind):
     assert servo.rough_targets == 50
     assert servo.update(np.diag([1.01, 1.01, 1.01, 1.0])).status == sk.Status.BAD_INPUT
     assert servo.rough_targets == 50
+
+
+@pytest.mark.parametrize("gain", ["gain_linear", "gain_angular"])
+def test_without_a_gain_nothing_is_led(gain):
+    arm, home = sk.robots.load("franka_panda"), sk.robots.home("franka_panda")
+    far = arm.pose(home)
+    far[0, 3] += 5.0  # out of reach
+    states = {}
+    for options in ({}, {gain: 0.0}):
+        servo = sk.Servo(arm, dt=4e-3, guided=True, **options)
+        servo.reset(home)
+        states[len(options)] = {servo.update(far).guide for _ in range(500)}
+    assert sk.GuideState.UNREACHABLE in states[0]
+    assert states[1] == {sk.GuideState.DIRECT}

@@ -2,8 +2,11 @@
 
 import concurrent.futures
 import copy
+import enum
 import multiprocessing
 import pickle
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -218,6 +221,76 @@ def test_chains_of_a_copy_share_nothing_that_changes():
     assert other != servo
     other.hold()
     assert other == servo
+
+
+# --- what is no value: docs/copies.md
+
+
+def no_values():
+    chain, home = sk.robots.load(ARM), sk.robots.home(ARM)
+    chunks = sk.ActionChunks(0.1)
+    chunks.reset(chain.pose(home))
+    capsule = sk.Capsule((0, 0, 0), (0, 0, 0.1), 0.1)
+    loop = sk.ServoLoop(started(chain))
+    all_of_them = [
+        chunks,
+        chunks.at(0.0),
+        chunks.counts,
+        sk.ServoBatch(chain, None, 1e-2, 2),
+        sk.Obstacle.sphere((1, 1, 1), 0.1),
+        capsule,
+        sk.LinkCapsule("link3", capsule),
+        loop,
+        loop.take("somebody"),
+        sk.Collisions(chain),
+    ]
+    return {type(one).__name__: one for one in all_of_them}
+
+
+def test_the_page_of_copies_names_every_class():
+    page = (Path(__file__).resolve().parents[2] / "docs" / "copies.md").read_text(encoding="utf-8")
+    head, none, rest = re.split(r"^## What is no value$|^## What a servo remembers$", page, flags=re.MULTILINE)
+    classes = {
+        name
+        for name in sk.__all__
+        if isinstance(one := getattr(sk, name), type) and not issubclass(one, (enum.Enum, Exception))
+    }
+    rules = {type(sk.methods.parse(name)).__name__ for name in sk.methods.ALL}
+    values = set(ALL) | {"LoopFault", "Crossing"}
+    assert classes <= values | set(no_values()) | {"Method"}
+    for name in values - rules:
+        assert f"`{name}`" in head
+    for name in no_values():
+        assert f"`{name}`" in none
+
+
+def test_what_is_no_value_is_not_copied():
+    for name, one in no_values().items():
+        ways = [pickle.dumps] if name == "Collisions" else [pickle.dumps, copy.copy, copy.deepcopy]
+        for way in ways:
+            with pytest.raises(TypeError, match="cannot pickle"):
+                way(one)
+        assert one == one  # noqa: PLR0124
+        assert isinstance(hash(one), int)
+    batch = sk.ServoBatch(sk.robots.load(ARM), None, 1e-2, 2)
+    batch.reset(sk.robots.home(ARM))
+    assert pickle.loads(pickle.dumps(batch.servo(1))) == batch.servo(1)
+
+
+@pytest.mark.parametrize("how", [copy.copy, copy.deepcopy])
+def test_a_copy_of_collisions_shares_the_obstacles_and_is_not_equal(how):
+    chain, home = sk.robots.load(ARM), sk.robots.home(ARM)
+    collisions = sk.Collisions(chain, [sk.Obstacle.sphere((3, 3, 3), 0.1)], self_collision=False)
+    other = how(collisions)
+    assert other != collisions
+    before = other.distance(home)
+    collisions.move(0, (0.9, 0.0, 0.3))
+    assert other.distance(home) == collisions.distance(home) < before
+    again = sk.Collisions(chain, [sk.Obstacle.sphere((3, 3, 3), 0.1)], self_collision=False)
+    assert sk.Servo(chain, collisions=collisions) == sk.Servo(chain, collisions=other)
+    assert sk.Servo(chain, collisions=collisions) != sk.Servo(chain, collisions=again)
+    with pytest.raises(TypeError, match="cannot pickle"):
+        pickle.dumps(sk.Servo(chain, collisions=collisions))
 
 
 # --- pickles that are none of ours

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import reprlib
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -52,8 +53,6 @@ class Driver:
         self.refused = 0  #: commands that were refused, since the driver was made
         self.last_refusal = ""  #: why the last one was
         self._make_servo(self.settings)
-        if not 0.0 < self.settings.timeout <= 60.0:
-            raise Error(f"timeout = {self.settings.timeout:g} s must be above 0 and at most 60")
         self._joints: dict[str, float] = {}
         self._q: Array | None = None
         self._qdot: Array | None = None
@@ -176,8 +175,8 @@ class Driver:
         self.settings = settings
 
     def _make_servo(self, settings: DriverSettings) -> Servo:
-        if not 1.0 <= settings.rate <= 1e4:
-            raise Error(f"rate = {settings.rate:g} Hz must be from 1 to 10000")
+        """Error where any of the settings is out of its range, also one that the servo does not have."""
+        _check(settings)
         return Servo(self.chain, settings.method, 1.0 / settings.rate, guided=settings.guided, **dict(settings.servo))
 
     # --- commands
@@ -189,9 +188,9 @@ class Driver:
 
         Returns whether the command was taken; `last_refusal` says why one was not.
         """
-        values = np.array(twist, dtype=float)
 
         def send(timeout: float) -> None:
+            values = _array("twist", twist)
             if values.shape != (6,) or not np.all(np.isfinite(values)):
                 raise Error(f"the twist needs six finite numbers, got {values}")
             axes = self._frame(frame)[:3, :3]
@@ -202,9 +201,9 @@ class Driver:
 
     def pose(self, pose: ArrayLike, frame: str = "", age: float = 0.0) -> bool:
         """Follows a pose (4, 4) of the tip in a frame; age and answer as for `twist`."""
-        matrix = np.array(pose, dtype=float)
 
         def send(timeout: float) -> None:
+            matrix = _array("pose", pose)
             if matrix.shape != (4, 4):
                 raise Error(f"the pose needs shape (4, 4), got {matrix.shape}")
             self._active().follow(self._frame(frame) @ matrix, timeout, self._token)
@@ -218,6 +217,8 @@ class Driver:
 
     def _command(self, send: Any, age: float) -> bool:
         try:
+            if not np.isfinite(age):
+                raise Error(f"the command's age is {age} s")
             timeout = self.settings.timeout - max(0.0, age)
             if not timeout > 0.0:
                 raise Error(f"the command is {age:.3g} s old, more than the time-out of {self.settings.timeout:g} s")
@@ -251,3 +252,22 @@ class Driver:
             if len(records):
                 self._newest = records[-1]
         return self._newest
+
+
+def _check(settings: DriverSettings) -> None:
+    """What the loop would refuse later: the command with the time-out, and the activation."""
+    if not 1.0 <= settings.rate <= 1e4:
+        raise Error(f"rate = {settings.rate:g} Hz must be from 1 to 10000")
+    if not 0.0 < settings.timeout <= 60.0:
+        raise Error(f"timeout = {settings.timeout:g} s must be above 0 and at most 60")
+    if settings.max_following_error is not None and not 0.0 < settings.max_following_error < np.inf:
+        raise Error(f"max_following_error = {settings.max_following_error:g} must be finite and above 0")
+    if settings.measure_timeout is not None and not settings.measure_timeout > 0.0:
+        raise Error(f"measure_timeout = {settings.measure_timeout:g} s must be above 0")
+
+
+def _array(what: str, numbers: ArrayLike) -> Array:
+    try:
+        return np.array(numbers, dtype=float)
+    except (TypeError, ValueError):
+        raise Error(f"the {what} is no array of numbers: {reprlib.repr(numbers)}") from None

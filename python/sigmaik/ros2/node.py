@@ -26,6 +26,7 @@ from std_srvs.srv import SetBool, Trigger  # noqa: E402
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint  # noqa: E402
 
 from .driver import Driver  # noqa: E402
+from .frames import rotation_of  # noqa: E402
 from .parameters import OUT_TYPES, PARAMETERS, check, driver_settings  # noqa: E402
 
 __all__ = ["MOVEIT_STATUS", "ServoNode"]
@@ -311,11 +312,4 @@ def _rotation_of(xyzw: Any) -> Any:
     length = float(np.linalg.norm(xyzw))
     if not math.isfinite(length) or abs(length - 1.0) > 1e-3:
         return np.full((3, 3), np.nan)
-    x, y, z, w = xyzw / length
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    )
+    return rotation_of(xyzw / length)

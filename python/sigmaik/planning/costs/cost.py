@@ -79,6 +79,9 @@ class Term(Cost):
     def parts(self) -> tuple[tuple[float, Bindable], ...]:  # type: ignore[override]
         return ((1.0, _OfTerm(self)),)
 
+    def __getstate__(self) -> dict[str, Any]:
+        return self.__dict__  # the parameters; `parts`, a slot of Cost, is made of them
+
     def bind_term(self, chain: Chain) -> JointCost | BatchCost:
         """This cost of one arm's joints. Error where a parameter is out of its range."""
         raise NotImplementedError
