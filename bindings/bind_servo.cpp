@@ -225,7 +225,7 @@ void bind_cycle(py::class_<Servo>& c) {
           "origin.\n"
           "dt: [s] the time since the last call, as for `update`.")
       .def_property_readonly("rough_targets", &Servo::rough_targets,
-                             "Targets of update() whose rotation was off by more than rounding (up to 1e-3 in RᵀR), "
+                             "Targets of update() whose rotation was off by more than rounding (up to 9e-4 in RᵀR), "
                              "and was made one.")
       .def(
           "set_tool",

@@ -79,7 +79,7 @@ bool is_right_handed(const PoseMatrix& matrix) noexcept {
 }
 
 Eigen::Matrix3d nearest_rotation(Eigen::Matrix3d matrix, Eigen::Matrix3d defect) noexcept {
-  // Each step squares the defect: 1e-3, 8e-7, 5e-13, rounding.
+  // Each step squares the defect: 9e-4, 6e-7, 3e-13, rounding.
   for (int i = 0; i < 4 && size_of(defect) >= 1e-14; ++i) {
     const Eigen::Matrix3d change = 0.5 * matrix.lazyProduct(defect);  // the product reads what the difference writes
     matrix -= change;

@@ -1259,7 +1259,7 @@ class Servo:
     @property
     def rough_targets(self) -> int:
         """
-        Targets of update() whose rotation was off by more than rounding (up to 5e-4 in RᵀR), and was made one.
+        Targets of update() whose rotation was off by more than rounding (up to 9e-4 in RᵀR), and was made one.
         """
     @property
     def settling_time(self) -> float:

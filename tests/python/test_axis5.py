@@ -223,12 +223,18 @@ def test_track_is_consistent():
         assert np.linalg.norm(off) < 1e-7  # the path is straight, whatever the clock says
 
 
+def test_the_line_may_pass_through_the_singularity():
+    track = axis5.run(axis5.motion(1, offset=0.0), "constrained", axis5.Axis5Settings())
+    assert track.finished
+    assert np.isfinite(track.qdot).all()
+
+
 def test_refuses():
     for changes, message in (
         ({"distance": 0.0}, "distance must be positive"),
         ({"distance": 3.0}, "leaves the arm's reach"),
         ({"duration": -1.0}, "duration must be positive"),
-        ({"offset": 0.0}, "offset must be from"),
+        ({"offset": -0.1}, "offset must be from"),
         ({"offset": math.nan}, "offset must be from"),
     ):
         with pytest.raises(ValueError, match=message):

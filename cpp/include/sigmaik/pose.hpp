@@ -27,7 +27,7 @@ Twist pose_error(const Pose& current, const Pose& target) noexcept;
 /// By how much an entry of RᵀR may differ from I in a matrix that is taken for a rotation: numbers written with four
 /// digits, products of many float32 rotations, and quaternions whose length is off by 1e-4 are within this tolerance
 /// (up to 8e-4 by the formula 1 − 2(y² + z²)). The functions that take a pose go on with the nearest rotation.
-inline constexpr double kRotationTolerance = 1e-3;
+inline constexpr double kRotationTolerance = 9e-4;
 
 /// Whether all entries are finite, the last row is 0 0 0 1, and R is a rotation (RᵀR = I within kRotationTolerance,
 /// det R > 0).
