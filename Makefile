@@ -39,7 +39,7 @@ test: lint build .venv/.test .venv/.package  ## everything: lint, install, stubs
 
 test-browser: .venv/.test .venv/.package  ## the page of `sigmaik teleop` in Chromium, without a screen (part of `make test`)
 	@tools/setup_system.sh $(PYTHON) chromium
-	$(BIN)/python -m pytest -n $$(( ($$(nproc) + 1) / 2 )) tests/browser  # a browser draws with a core of its own
+	$(BIN)/python -m pytest -n $$(nproc) tests/browser
 
 test-ros2: .venv/.test .venv/.package  ## the ROS 2 node, in processes of its own (part of `make test`)
 	$(BIN)/python -m pytest tests/ros2
