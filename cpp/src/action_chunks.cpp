@@ -263,12 +263,13 @@ ActionStatus ActionChunks::status(const Chunk& chunk, double time) const noexcep
 // Output -------------------------------------------------------------------------------------------------------------
 
 ActionTarget ActionChunks::at(double time) noexcept {
-  if (!std::isfinite(time) || (timed_ && time < time_ && time >= time_ - kClocksDiffer)) {
+  const bool back = timed_ && time < time_;
+  if (!std::isfinite(time) || (back && time >= time_ - kClocksDiffer)) {
     ActionTarget out = last_;  // a target that stays where it is does not move
     out.twist.setZero();
     return out;
   }
-  if (timed_ && time < time_) {
+  if (back) {
     forget();
     timed_ = false;
   }

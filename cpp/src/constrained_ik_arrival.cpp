@@ -119,11 +119,9 @@ ConstrainedIk::Closing ConstrainedIk::close(bool still) noexcept {
 // turns against the arm, more than twice, a part of its speed stays; all of it comes back when the target moves. The
 // speed never vanishes, so that a target within reach is still approached.
 void ConstrainedIk::calm(const JointVector& wanted, bool still) noexcept {
-  const double part = std::min(0.5, options_.dt / kCalming);
-  const double along = tracker_.qdot().dot(wanted);
-  const bool against = along < 0.0;
+  const bool against = tracker_.qdot().dot(wanted) < 0.0;
   if (!still) {
-    patience_ += part * (1.0 - patience_);
+    patience_ += std::min(0.5, options_.dt / kCalming) * (1.0 - patience_);
     turns_ = 0;
   } else if (against && !against_ && ++turns_ > kTurns) {
     patience_ *= kLess;

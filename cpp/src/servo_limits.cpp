@@ -81,6 +81,7 @@ double Servo::folding_limit() const noexcept {
   return open > detail::Elbow::kMargin ? tracker_.heading_speed(elbow->joint, open - detail::Elbow::kMargin) : 0.0;
 }
 
+// Whether q̇ folds the elbow faster than that.
 bool Servo::folds(const JointVector& qdot) const noexcept {
   const detail::Elbow* elbow = elbow_.operator->();
   return elbow != nullptr && -elbow->open_rate(qdot[elbow->joint]) > folding_limit();
