@@ -17,6 +17,7 @@ using namespace detail::constrained;
 constexpr double kMissed = 0.25;   // part of the exact rows' change from which on the joints go in proportion
 constexpr double kCalming = 0.05;  // [s] in which the patience comes back by 1 − 1/e where the target moves
 constexpr double kLess = 0.7;      // of the closing speed stays at each further turn
+constexpr double kNearer = 0.98;   // of the least error: below, a turn is forgiven
 constexpr double kJump = 0.5;      // part of the joints' bounds; a larger change of the target's motion is a jump
 constexpr double kLarge = 0.1;     // [rad, m] an error of the approximate rows that needs an arrival
 constexpr double kFade = 1.0;      // [s] time constant of a motion's end after the settling time
@@ -25,14 +26,20 @@ constexpr int kTurns = 2;          // times that the closing motion may turn aga
 }  // namespace
 
 // The problem without limits but for a joint's step of a radian or a metre a time constant: farther, no linearisation
-// holds.
-LeastSquaresSolution ConstrainedIk::solve_freely() noexcept {
+// holds. The step is a part of the way that is left, and this way ends at the position limits: past them, a joint would
+// stand at its limit, and the others would take the tip away from the target.
+LeastSquaresSolution ConstrainedIk::solve_freely(double part) noexcept {
   const int n = chain_.dof();
   const double most = std::min(1.0, options_.dt / kSettling);
   auto& p = problem_;
   p.h.setConstant(kInfinity);
   p.lower.head(n).setConstant(-most);
   p.upper.head(n).setConstant(most);
+  if (options_.limits.position) {
+    const JointLimits& limits = chain_.limits();
+    p.lower.head(n) = p.lower.head(n).cwiseMax((part * (limits.lower - tracker_.q())).cwiseMin(0.0));
+    p.upper.head(n) = p.upper.head(n).cwiseMin((part * (limits.upper - tracker_.q())).cwiseMax(0.0));
+  }
   p.lower.tail(p.lower.size() - n).setZero();
   p.upper.tail(p.upper.size() - n).setZero();
   return closing_.solve(p);
@@ -72,6 +79,7 @@ void ConstrainedIk::end_arrival() noexcept {
   arriving_ = against_ = false;
   patience_ = 1.0;
   turns_ = 0;
+  least_error_ = kInfinity;
 }
 
 // How much of the error that is behind may be closed in this cycle, see constrained_ik.hpp. `still`: the target rests.
@@ -92,12 +100,12 @@ ConstrainedIk::Closing ConstrainedIk::close(bool still) noexcept {
   set_approximate_rows(at, Twist::Zero(), Closing{});
   set_exact_rows(at, Closing{});
   problem_.d *= part;
-  const LeastSquaresSolution solution = solve_freely();
+  const LeastSquaresSolution solution = solve_freely(part);
   if (solution.status == LeastSquaresStatus::BadInput) return out;
   Twist change = Twist::Zero();
   for (int j = 0; j < n; ++j) change += solution.x[j] * at.slope.col(j);
   out.qdot = solution.x.head(n) / options_.dt;
-  calm(out.qdot, still);
+  calm(out.qdot, behind.norm(), still);
   const double brake = patience_ * tracker_.arrival(out.qdot, part / options_.dt);
   // An error so small that one cycle can both make it up and stop again needs no decay.
   const VelocityBounds& bounds = tracker_.bounds();
@@ -116,16 +124,21 @@ ConstrainedIk::Closing ConstrainedIk::close(bool still) noexcept {
 
 // At the edge of the reach, and where the approximate rows cannot be met together with the exact ones, the way that a
 // linearisation shows is too long, and the arm would swing about a resting target. So each time that the closing motion
-// turns against the arm, more than twice, a part of its speed stays; all of it comes back when the target moves. The
-// speed never vanishes, so that a target within reach is still approached.
-void ConstrainedIk::calm(const JointVector& wanted, bool still) noexcept {
+// turns against the arm, more than twice, a part of its speed stays; all of it comes back when the target moves. Each
+// time that the error has become less by a fiftieth, one turn is forgiven: an arm that swings about a singularity on its
+// way goes on, and at the edge of the reach the error falls no further.
+void ConstrainedIk::calm(const JointVector& wanted, double error, bool still) noexcept {
   const bool against = tracker_.qdot().dot(wanted) < 0.0;
   if (!still) {
     patience_ += std::min(0.5, options_.dt / kCalming) * (1.0 - patience_);
     turns_ = 0;
+    least_error_ = kInfinity;
   } else if (against && !against_ && ++turns_ > kTurns) {
     patience_ *= kLess;
     turns_ = kTurns;
+  } else if (error < kNearer * least_error_) {
+    patience_ = std::min(1.0, patience_ / kLess);
+    least_error_ = error;
   }
   against_ = against;
 }
@@ -139,7 +152,7 @@ JointVector ConstrainedIk::follow(const Twist& motion) noexcept {
   at.offset = -motion;
   set_approximate_rows(at, motion, Closing{});
   set_exact_rows(at, Closing{});
-  const LeastSquaresSolution solution = solve_freely();
+  const LeastSquaresSolution solution = solve_freely(1.0);
   if (solution.status == LeastSquaresStatus::BadInput) return JointVector::Zero(n);
   return solution.x.head(n) / options_.dt;
 }

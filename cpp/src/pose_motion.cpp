@@ -14,7 +14,7 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr double kLongest = 1e6;  // [s]: up to here squares and quotients of rates and accelerations keep their digits
+constexpr double kLongestTime = 1e6;  // [s]: up to here squares and quotients of rates and accelerations keep their digits
 
 // A vector that changes with time, and its first two derivatives.
 struct Curve {
@@ -150,7 +150,7 @@ PoseMotion extrapolated(const PoseMotion& from, double seconds) noexcept {
 // rate of exp(d) and exp(d) ω_R.
 void follow(const PoseMotion& then, const PoseMotion& now, double dt, const FollowLimits& limits,
             PoseMotion& target) noexcept {
-  const double smoothing = limits.smoothing < kShortest ? 0.0 : std::min(limits.smoothing, kLongest);
+  const double smoothing = limits.smoothing < kShortest ? 0.0 : std::min(limits.smoothing, kLongestTime);
   Twist way = pose_error(then.pose, target.pose);
   const Matrix3d turn = rotation_exp(way.tail<3>());
   const Vector3d carried = turn * then.twist.tail<3>(), spin = target.twist.tail<3>() - carried;

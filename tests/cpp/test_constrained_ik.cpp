@@ -12,6 +12,8 @@
 #include <sigmaik/error.hpp>
 #include <sigmaik/pose.hpp>
 
+#include "arms.hpp"
+#include "configurations.hpp"
 #include "numbers.hpp"
 #include "oracles.hpp"
 #include "random.hpp"
@@ -533,6 +535,35 @@ TEST_CASE("at a target out of reach the arm does not swing, and its joints end b
       CHECK(step.status == Status::Limited);
     }
   }
+}
+
+TEST_CASE("a reachable target is reached, at joint limits and through singularities, too") {
+  const auto arrives = [](const Chain& chain, const JointVector& from, const JointVector& to) {
+    CAPTURE(from.transpose());
+    CAPTURE(to.transpose());
+    ConstrainedIk ik(chain, every(2e-3));
+    ik.reset(from);
+    const Pose target = pose(chain, to);
+    ConstrainedIkStep step;
+    for (int i = 0; i < 4000; ++i) step = ik.update(target);
+    CHECK(step.error.norm() < 1e-5);
+    CHECK(speed(chain, step.qdot) < 1e-3);
+  };
+  for (const auto& [name, chain] : test::arms()) {
+    CAPTURE(name);
+    Random random(2);
+    for (int k = 0; k < 25; ++k) {
+      const JointVector from = test::sample(random, chain);
+      JointVector to = from;
+      for (double& q : to) q += random.uniform(-0.25, 0.25);
+      arrives(chain, from, to.cwiseMax(chain.limits().lower).cwiseMin(chain.limits().upper));
+    }
+  }
+  // Joint 3 is near its upper limit, and the shortest way without limits leads past this limit.
+  JointVector from(6), to(6);
+  from << 2.272, 2.131, -0.122, 0.675, 0.801, -11.704;
+  to << 2.113, 2.027, -0.012, 0.588, 0.897, -11.703;
+  arrives(arm("comau_racer_7_1_4"), from, to);
 }
 
 TEST_CASE("a motion that is too fast leaves the tool upright, and the tool arrives") {

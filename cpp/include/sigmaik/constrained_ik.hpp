@@ -28,9 +28,10 @@
 ///     c = Δq₀/dt · LimitTracker::arrival(Δq₀/dt, κ/dt),     J^ex Δq₀ = −κ e₀^ex,  min |α(J^ap Δq₀ + e₀^ap)|² + |β J^ap
 ///     Δq₀|²
 ///
-/// without limits, where κ is the part of an error that a cycle closes without limits: dt/25 ms for the exact rows, and
-/// α²/(α²+β²) for the others, whichever is more. Δq₀/κ is the way that is left, so the joints never close faster than
-/// they can still brake, with half of their acceleration. The optimisation then asks its rows to change by J c dt
+/// where κ is the part of an error that a cycle closes without limits: dt/25 ms for the exact rows, and α²/(α²+β²) for
+/// the others, whichever is more. Δq₀/κ is the way that is left. The way ends inside the position limits; otherwise a
+/// joint would stand at its limit while the others take the tip away from the target. The joints never close faster than
+/// they can still brake on this way, with half of their acceleration. The optimisation then asks its rows to change by J c dt
 /// instead of −e₀. As the way goes to zero, c does: a resting target is a fixed point. An exact error that one cycle
 /// can make up, with a twentieth of the acceleration, is made up in one cycle.
 ///
@@ -41,8 +42,9 @@
 /// undone.
 ///
 /// At the edge of the reach the way Δq₀/κ is longer than what a straight line finds, and c turns against the arm again
-/// and again. From the second such turn at a resting target on, c is cut, until it is zero; it comes back when the
-/// target moves.
+/// and again. From the second such turn at a resting target on, each turn leaves 0.7 of c. Each time that the error has
+/// fallen by a fiftieth, one turn is forgiven: an arm that swings about a singularity on its way arrives. At the edge of
+/// the reach the error falls no further, so c goes to zero there. A target that moves gets all of c back.
 ///
 /// Along a valley of the error the arm may creep for as long as it likes. After settling_time() at a resting target q̇
 /// is faded out with a time constant of 1 s, and not_settling says so: a target that rests always brings the arm to
@@ -203,9 +205,9 @@ class ConstrainedIk {
   bool jumps(const Twist& motion) const noexcept;
   void end_arrival() noexcept;
   bool optimise_once(const Pose& target, const Twist& motion, double least, ConstrainedIkStep& step) noexcept;
-  void calm(const JointVector& wanted, bool still) noexcept;
+  void calm(const JointVector& wanted, double error, bool still) noexcept;
   JointVector follow(const Twist& motion) noexcept;
-  LeastSquaresSolution solve_freely() noexcept;
+  LeastSquaresSolution solve_freely(double part) noexcept;
   JointVector head(const JointVector& wanted) const noexcept;
   double missed(const LeastSquaresSolution& solution) const noexcept;
   bool exceeds(const Eigen::Matrix3d& rotation, const Closing& closing) const noexcept;
@@ -235,6 +237,7 @@ class ConstrainedIk {
   double patience_ = 1.0;  // in [0, 1], part of the closing velocity; below 1 after the arm swung about the target
   int turns_ = 0;          // how often the closing motion turned against the arm since the target rests
   bool against_ = false;   // the closing motion was against the arm in the last cycle
+  double least_error_ = std::numeric_limits<double>::infinity();  // of the arrival, when a turn was forgiven last
   ChainState state_;
   Preview preview_;
   JointVector turn_;    // where a motion of the joints that leaves the tip at rest ends; empty: there is none
