@@ -30,12 +30,14 @@ docs: .venv/.docs .venv/.test .venv/.package  ## the documentation site, in buil
 lint: .venv/.test  ## format, style, types, spelling, and what the repository says of itself
 	tools/lint.sh
 
-test: lint build .venv/.test .venv/.package  ## everything: lint, install, stubs, C++ tests, Python tests, docs
-	tools/check_install.sh build/release
+test: | system  ## everything: lint, install, stubs, C++ tests, Python tests, docs
+	@tools/together.sh '$(MAKE) build' '$(MAKE) lint'
+	@$(MAKE) .venv/.package
+	@tools/together.sh 'tools/check_install.sh build/release' '$(MAKE) docs'
 	tools/stubs.sh --check
 	ctest --test-dir build/release --output-on-failure -j $$(nproc)
 	$(BIN)/python -m pytest -n $$(nproc) --dist worksteal
-	$(MAKE) test-browser test-ros2 docs
+	$(MAKE) test-browser test-ros2
 
 test-browser: .venv/.test .venv/.package  ## the page of `sigmaik teleop` in Chromium, without a screen (part of `make test`)
 	@tools/setup_system.sh $(PYTHON) chromium

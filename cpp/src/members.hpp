@@ -473,6 +473,7 @@ struct Members<ConstrainedIk> {
                                   &T::patience_,
                                   &T::turns_,
                                   &T::against_,
+                                  &T::least_error_,
                                   &T::state_,
                                   &T::preview_,
                                   &T::turn_,
