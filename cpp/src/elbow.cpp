@@ -64,7 +64,7 @@ std::optional<Vector3d> lever(const Axis& elbow, const Axis& near, const Axis* f
 
 }  // namespace
 
-std::unique_ptr<Elbow> Elbow::with_short_side(const Chain& chain) {
+std::unique_ptr<Elbow> Elbow::of(const Chain& chain) {
   const auto& types = chain.joint_types();
   const bool turns = std::none_of(types.begin(), types.end(), [](JointType t) { return t == JointType::Prismatic; });
   if (!turns || chain.has_mimics()) return nullptr;
@@ -88,8 +88,9 @@ std::unique_ptr<Elbow> Elbow::with_short_side(const Chain& chain) {
     double straight = std::atan2(to_wrist->cross(-*to_shoulder).dot(axes[i].direction), to_wrist->dot(-*to_shoulder));
     straight += kTurn * std::ceil((lower - straight) / kTurn);
     const double below = straight - lower, above = upper - straight;
-    if (above < 0.0 || std::min(below, above) >= kShortSide * std::max(below, above)) continue;
-    out = std::make_unique<Elbow>(Elbow{joint, straight, above > below});
+    if (above < 0.0) continue;
+    const int longer = below < kShortSide * above ? 1 : above < kShortSide * below ? -1 : 0;
+    out = std::make_unique<Elbow>(Elbow{joint, straight, longer});
   }
   return out;
 }

@@ -1,5 +1,5 @@
 #pragma once
-// The side of the elbow from which an arm can come back.
+// The side of the elbow that a guided servo keeps.
 
 #include <memory>
 
@@ -15,7 +15,7 @@ namespace sigmaik::detail {
 //
 // with the distances ρ of S and W from the elbow's axis. The arm is straight, singular, at the angle `straight`. On
 // either side the same reaches are taken, the elbow mirrored, as far as the joint's range goes. Where a position limit
-// cuts the range shortly beyond `straight`, an arm that folds to the short side stops at this limit, still stretched.
+// leaves less than half as much on one side, an arm that folds to this short side stops at the limit, still stretched.
 struct Elbow {
   // [rad] to `straight`: a servo keeps this far off, where the sign of the elbow's part of the Jacobian is certain. A
   // reach of 1 m with equal links becomes 0.3 mm shorter.
@@ -23,16 +23,18 @@ struct Elbow {
 
   int joint;        // 0 to n − 1
   double straight;  // [rad]
-  bool above;       // the long side: angles above `straight`
+  int longer;       // 1: angles above `straight`, −1: below; 0: the two sides are alike
 
-  // [rad] from `straight` to the joint's position, positive on the long side.
-  double open(double q) const noexcept { return above ? q - straight : straight - q; }
+  // The side that is kept, 1 or −1; 0: none. An elbow whose sides are alike and that is straight, but for rounding,
+  // has none.
+  int side(double q) const noexcept {
+    const double open = q - straight;
+    if (longer != 0) return longer * open >= 0.0 ? longer : 0;
+    return open >= 0.5 * kMargin ? 1 : open <= -0.5 * kMargin ? -1 : 0;
+  }
 
-  // [rad/s] the same of the joint's velocity.
-  double open_rate(double qdot) const noexcept { return above ? qdot : -qdot; }
-
-  // The elbow of an arm whose short side is less than half of the long one; none of another arm.
-  static std::unique_ptr<Elbow> with_short_side(const Chain& chain);
+  // None where the arm has no such joint, or its elbow can turn round.
+  static std::unique_ptr<Elbow> of(const Chain& chain);
 };
 
 }  // namespace sigmaik::detail

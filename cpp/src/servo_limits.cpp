@@ -73,31 +73,32 @@ void Servo::limit(ServoStep& step) noexcept {
   judge(asked, step);
 }
 
-// [rad/s] ≥ 0, how fast the elbow may fold towards its short side; see Servo, the elbow's side.
+// [rad/s] ≥ 0, how fast the elbow may come near its straight angle; see Servo, the elbow's side.
 double Servo::folding_limit() const noexcept {
   const detail::Elbow* elbow = elbow_.operator->();
-  const double open = elbow != nullptr ? elbow->open(tracker_.q()[elbow->joint]) : -1.0;
-  if (open < 0.0) return std::numeric_limits<double>::infinity();
-  return open > detail::Elbow::kMargin ? tracker_.heading_speed(elbow->joint, open - detail::Elbow::kMargin) : 0.0;
+  if (elbow == nullptr) return std::numeric_limits<double>::infinity();
+  const double q = tracker_.q()[elbow->joint], room = std::abs(q - elbow->straight) - detail::Elbow::kMargin;
+  if (elbow->side(q) == 0) return std::numeric_limits<double>::infinity();
+  return room > 0.0 ? tracker_.heading_speed(elbow->joint, room) : 0.0;
 }
 
 // Whether q̇ folds the elbow faster than that.
 bool Servo::folds(const JointVector& qdot) const noexcept {
   const detail::Elbow* elbow = elbow_.operator->();
-  return elbow != nullptr && -elbow->open_rate(qdot[elbow->joint]) > folding_limit();
+  return elbow != nullptr && -elbow->side(tracker_.q()[elbow->joint]) * qdot[elbow->joint] > folding_limit();
 }
 
 // Puts the elbow's side into heading bounds.
 void Servo::keep_side(VelocityBounds& heading) const noexcept {
   const detail::Elbow* elbow = elbow_.operator->();
   if (elbow == nullptr) return;
-  const int i = elbow->joint;
+  const int i = elbow->joint, side = elbow->side(tracker_.q()[i]);
   const auto at = static_cast<std::size_t>(i);
   const double most = folding_limit();
-  if (elbow->above && -most > heading.lower[i]) {
+  if (side > 0 && -most > heading.lower[i]) {
     heading.lower[i] = std::min(-most, heading.upper[i]);
     heading.lower_kind[at] = LimitKind::Position;
-  } else if (!elbow->above && most < heading.upper[i]) {
+  } else if (side < 0 && most < heading.upper[i]) {
     heading.upper[i] = std::max(most, heading.lower[i]);
     heading.upper_kind[at] = LimitKind::Position;
   }

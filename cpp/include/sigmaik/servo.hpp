@@ -205,12 +205,14 @@ struct ServoStep {
 /// commands are those of a servo without a guide, but for the elbow's side (below). Targets that move, and twists, are
 /// never led elsewhere. The constructor takes about 2 ms.
 ///
-/// *The elbow's side.* The straight elbow is a singularity with the same reaches on either side. On some arms (Panda,
-/// xArm7, Comau Racer) a position limit leaves less than half as much on one side as on the other: an arm that folds to
-/// this short side, on its way back from the edge of its reach, stays stretched out at the limit. A guided servo keeps
-/// the elbow on the long side: 0.05 rad before the straight angle is a heading bound, like a position limit, for pose
-/// targets and for twists; a reach of 1 m becomes 0.3 mm shorter. An elbow on the short side, where it
-/// has started or where the guide has led it, is free until it leaves this side.
+/// *The elbow's side.* The straight elbow is a singularity with the same reaches on either side. An arm that folds to
+/// the other side, on its way back from the edge of its reach, may end at a position limit, and another time has other
+/// joint positions for the same pose. A guided servo keeps the elbow on its side: 0.05 rad before the straight angle is
+/// a heading bound, like a position limit, for pose targets and for twists; a reach of 1 m becomes 0.3 mm shorter. An
+/// elbow that starts within 0.025 rad of the straight angle may bend to either side. On some arms (Panda, xArm7, Comau Racer) a position limit
+/// leaves less than half as much on one side as on the other. An elbow on this short side, where it has started or
+/// where the guide has led it, is free until it leaves this side. Where the guide leads the joints, it may change the
+/// side.
 ///
 /// *Time of a cycle.* update(), update_twist() and hold() take the time since the last call on the robot's clock, in
 /// [kShortestCycle, kLongestCycle] times options().dt; options().dt where no time is given. A program that loses a
