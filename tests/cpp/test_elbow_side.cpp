@@ -122,7 +122,7 @@ namespace {
 
 // Joint 3 of arms with two long sides, and its straight angle: where the wrist is farthest from the shoulder's axis.
 const std::map<std::string, double> kTwoLongSides{
-    {"ur10", 0.0}, {"puma560", -M_PI / 2 - std::atan(0.0203 / 0.4318)}, {"kuka_kr6_r900", std::atan(25.0 / 420.0)}};
+    {"ur10", 0.0}, {"puma560", -M_PI / 2 + std::atan(0.0203 / 0.4318)}, {"kuka_kr6_r900", std::atan(25.0 / 420.0)}};
 
 }  // namespace
 

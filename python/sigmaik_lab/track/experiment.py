@@ -62,6 +62,7 @@ class TrackSettings:
     #: Speed of a target that is not recorded, as a part of the hand's own; None: 1, or less where the arm is too slow.
     pace: float | None = None
     seed: int = 0
+    guided: bool = True  #: the elbow keeps its side
     gain_linear: float = 10.0  #: [1/s]
     gain_angular: float = 10.0  #: [1/s]
     posture_gain: float = 0.0  #: [1/s] towards home, where the arm is redundant
@@ -258,6 +259,7 @@ def follow(e: TrackExperiment, variant: Variant, progress: Callable[[int], None]
         gain_linear=s.gain_linear,
         gain_angular=s.gain_angular,
         posture_gain=s.posture_gain,
+        guided=s.guided,
     )
     servo.reset(e.start)
     stream = None

@@ -107,6 +107,8 @@ def options(parser: argparse.ArgumentParser) -> None:
             )
         if title == "the camera":
             group.add_argument("--no-gap", action="store_true", help="the stream does not stop")
+        else:
+            group.add_argument("--no-guide", action="store_true", help="the elbow may change its side")
     add_output(parser, "sigmaik-track", ("npz",))
 
 
@@ -115,7 +117,9 @@ def load(args: argparse.Namespace) -> Iterable[Tracking]:
     camera = Camera(**{name: given[f"track_{name}_camera"] for _, name, _, _ in _CAMERA})
     if args.no_gap:
         camera = dataclasses.replace(camera, gap=None)
-    settings = TrackSettings(seed=args.seed, **{name: given[f"track_{name}_loop"] for _, name, _, _ in _SETTINGS})
+    settings = TrackSettings(
+        seed=args.seed, guided=not args.no_guide, **{name: given[f"track_{name}_loop"] for _, name, _, _ in _SETTINGS}
+    )
     modes = choices("mode", args.mode, MODES)
     methods = parse_methods(args.method or ["all"], ReachSettings(rate=settings.rate, adaptive=True))
     experiment = load_track(args.robot, args.target, settings, camera, args.base, args.tip)
