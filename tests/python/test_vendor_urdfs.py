@@ -313,6 +313,23 @@ def test_an_arm_of_five_joints_keeps_its_position_and_gives_up_the_tilt():
         assert np.linalg.norm(error[3:]) <= 0.5
 
 
+def test_the_shipped_so101_is_the_makers():
+    """Up to the rounding of the file's angles (1.5708, 3.14159), but for velocity and effort, which are the servo's."""
+    file = FILES["example-robot-data/so_arm_description/so101.urdf"]
+    chain, shipped = sk.Chain.from_urdf(file, tip="gripper_frame_link"), sk.robots.load("so101")
+    assert shipped.joint_names == chain.joint_names
+    assert shipped.base == chain.base
+    np.testing.assert_array_equal(shipped.limits.lower, chain.limits.lower)
+    np.testing.assert_array_equal(shipped.limits.upper, chain.limits.upper)
+    assert np.all(shipped.limits.velocity < chain.limits.velocity)
+    mass, expected = sk.Dynamics(shipped), sk.Dynamics(chain)
+    rng = np.random.default_rng(SEED)
+    for _ in range(100):
+        q = chain.random_configuration(rng)
+        np.testing.assert_allclose(shipped.pose(q), chain.pose(q), rtol=0, atol=2e-5)
+        np.testing.assert_allclose(mass.mass_matrix(q), expected.mass_matrix(q), rtol=0, atol=1e-6)
+
+
 @pytest.mark.parametrize(("name", "tip", "dof"), ARMS, ids=IDS)
 def test_spheres(name, tip, dof):
     """Their shapes are meshes for the most part: capsules stand in, from the base to the tip."""

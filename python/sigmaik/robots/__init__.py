@@ -6,7 +6,8 @@
     >>> arm = sk.robots.open("arm.urdf")          # a name, or a file of your own: arm.chain, arm.home
 
 The first lines of each file say where its figures come from, and what a user must know before using the file.
-The tip of every arm is its mechanical flange (link ``flange``), and the base is the root link.
+The tip of every arm is its link ``flange``, and the base is the root link. ``flange`` is the mechanical flange; where a
+hand belongs to the arm (Jaco 2, SO-101), it is the frame between the fingers.
 """
 
 from __future__ import annotations
@@ -55,7 +56,7 @@ def path(name: str) -> Path:
 def load(name: str) -> Chain:
     """The arm as a chain from its root link to ``flange``, with its limits.
 
-    Units: m, rad, rad/s, rad/s^2, N m; a limit that is not public is infinite.
+    Units: m, rad, rad/s, rad/s^2, rad/s^3, N m; a limit that is not public is infinite.
     Error where no arm of that name is shipped; for a file of your own use ``Chain.from_urdf``.
     """
     return Chain.from_urdf(str(path(name)), tip="flange")
