@@ -616,7 +616,7 @@ TEST_CASE("the shipped arms") {
     CAPTURE(entry.path().string());
     ++count;
     const Chain chain = Chain::from_urdf(entry.path().string());
-    CHECK(chain.dof() >= 6);
+    CHECK(chain.dof() >= 5);
     CHECK((chain.limits().velocity.array() < kInfinity).all());
   }
   CHECK(count >= 9);
