@@ -619,7 +619,7 @@ TEST_CASE("the shipped arms") {
     CHECK(chain.dof() >= 5);
     CHECK((chain.limits().velocity.array() < kInfinity).all());
   }
-  CHECK(count >= 9);
+  CHECK(count >= 14);
 }
 
 }  // namespace
