@@ -90,6 +90,7 @@ std::unique_ptr<Elbow> Elbow::of(const Chain& chain) {
     const double below = straight - lower, above = upper - straight;
     if (above < 0.0) continue;
     const int longer = below < kShortSide * above ? 1 : above < kShortSide * below ? -1 : 0;
+    if (longer == 0 && chain.dof() > 6) continue;  // a self-motion leads from one side to the other
     out = std::make_unique<Elbow>(Elbow{joint, straight, longer});
   }
   return out;

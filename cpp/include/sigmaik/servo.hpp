@@ -211,8 +211,9 @@ struct ServoStep {
 /// a heading bound, like a position limit, for pose targets and for twists; a reach of 1 m becomes 0.3 mm shorter. An
 /// elbow that starts within 0.025 rad of the straight angle may bend to either side. On some arms (Panda, xArm7, Comau Racer) a position limit
 /// leaves less than half as much on one side as on the other. An elbow on this short side, where it has started or
-/// where the guide has led it, is free until it leaves this side. Where the guide leads the joints, it may change the
-/// side.
+/// where the guide has led it, is free until it leaves this side. With more than six joints and two long sides (iiwa,
+/// Gen3) a self-motion leads from one side to the other, and the elbow is free. Where the guide leads the joints, it
+/// may change the side.
 ///
 /// *Time of a cycle.* update(), update_twist() and hold() take the time since the last call on the robot's clock, in
 /// [kShortestCycle, kLongestCycle] times options().dt; options().dt where no time is given. A program that loses a
