@@ -137,6 +137,7 @@ void Servo::begin(const JointRef& posture) noexcept {
   fade_ = 0.0;
   expect_motion();
   forget_guide();
+  escape_.resize(0);
   following_error_.setZero();
   expected_error_.setZero();
   measured_ = false;
@@ -352,7 +353,9 @@ ServoStep Servo::resolve(const Twist& twist, const Twist* feedforward, bool fade
   step.qdot = solution.qdot;
   step.achieved_twist = solution.achieved_twist;
 
+  const bool leaves = solution.singular != 0 && escapes() && escape(twist, step.qdot);
   bool rule = feedforward == nullptr || !arrive(*feedforward, step.qdot);  // the rule's answer stands
+  if (leaves) rule = false;
   if (fade_in(step.qdot, fade)) rule = false;
   if (goal != nullptr) {
     lead(*goal, step);

@@ -549,7 +549,8 @@ TEST_CASE("a reachable target is reached, at joint limits and through singularit
     CHECK(step.error.norm() < 1e-5);
     CHECK(speed(chain, step.qdot) < 1e-3);
   };
-  for (const auto& [name, chain] : test::arms()) {
+  for (const auto& [key, chain] : test::arms()) {
+    const std::string& name = key;
     CAPTURE(name);
     Random random(2);
     for (int k = 0; k < 25; ++k) {

@@ -209,11 +209,27 @@ struct ServoStep {
 /// the other side, on its way back from the edge of its reach, may end at a position limit, and another time has other
 /// joint positions for the same pose. A guided servo keeps the elbow on its side: 0.05 rad before the straight angle is
 /// a heading bound, like a position limit, for pose targets and for twists; a reach of 1 m becomes 0.3 mm shorter. An
-/// elbow that starts within 0.025 rad of the straight angle may bend to either side. On some arms (Panda, xArm7, Comau Racer) a position limit
-/// leaves less than half as much on one side as on the other. An elbow on this short side, where it has started or
-/// where the guide has led it, is free until it leaves this side. With more than six joints and two long sides (iiwa,
-/// Gen3) a self-motion leads from one side to the other, and the elbow is free. Where the guide leads the joints, it
-/// may change the side.
+/// elbow that starts within 0.025 rad of the straight angle may bend to either side. On some arms (Panda, xArm7, Comau
+/// Racer) a position limit leaves less than half as much on one side as on the other. An elbow on this short side,
+/// where it has started or where the guide has led it, is free until it leaves this side. With more than six joints and
+/// two long sides (iiwa, Gen3) a self-motion leads from one side to the other, and the elbow is free. Where the guide
+/// leads the joints, it may change the side.
+///
+/// *Out of a singularity.* To first order no motion of the joints moves the tool along a direction u that is lost, with
+/// uᵀJ = 0. To second order a motion δ in the null space does, by ½ δᵀH δ with H_kj = uᵀ∂J_j/∂q_k, symmetrised. So the
+/// adaptive JParse of a servo leaves an exactly singular configuration where the second order leads the right way: a
+/// straight-up iiwa or Gen3 follows a twist sideways, down, and about the axis in which it is straight. With the part
+/// w_i = 1 − (σ_i/ε)² that the rule leaves out along a direction below its threshold ε, c = Σ w_i u_i u_iᵀẋ, u = c/|c|
+/// and the projector P = 1 − Σ (1 − √w_i) v_i v_iᵀ (w_i = 0 for regular directions), the servo adds
+///
+///     q̇ = s (|c|/ε) P y,     P H P y = λ y,   λ the largest eigenvalue,
+///
+/// where s goes from 0 at λ = 0.02 σ_max/rad to 1 at twice this. At σ_i = ε this is zero, and from there on the rule
+/// alone moves on along the direction that has opened; at σ_i = 0 its speed is the one that the threshold allows the
+/// direction. The sign of y is the one for which cᵀJ P y ≥ 0, so what is added never lets the error grow (with equal
+/// gains V̇ ≤ 0 stays); where the first order does not decide, y follows that of the last cycle, and in the first cycle
+/// the side with more room to the position limits. Nothing is added where λ ≤ 0: beyond the reach no motion gains. Not
+/// with other rules, `exact`, or joint_weights. A singularity that opens only by a detour (a wrist) is the guide's.
 ///
 /// *Time of a cycle.* update(), update_twist() and hold() take the time since the last call on the robot's clock, in
 /// [kShortestCycle, kLongestCycle] times options().dt; options().dt where no time is given. A program that loses a
@@ -363,6 +379,11 @@ class Servo {
   JointVector mixed(const JointVector& by_priority, const JointVector& together) const noexcept;
   TaskJacobian weighted_rows(const Task& task) const noexcept;
 
+  // servo_escape.cpp
+  bool escapes() const noexcept;
+  bool escape(const Twist& twist, JointVector& qdot) noexcept;
+  JointMatrix second_order(const Twist& along) const noexcept;
+
   // servo_arrival.cpp
   bool arrive(const Twist& feedforward, JointVector& qdot) noexcept;
   double calm() const noexcept;
@@ -429,6 +450,7 @@ class Servo {
   double max_linear_error_;
   double fade_ = 1.0, rested_ = 0.0;
   bool measured_ = false;
+  JointVector escape_;                           // y of the way out of a singularity, in the last cycle; empty: none
   JointVector guided_posture_;                   // the posture that the guide has given; empty: none
   detail::Owner<detail::Guide> guide_;           // null: not guided
   detail::Owner<detail::Elbow> elbow_;           // null: may fold to either side
