@@ -10,6 +10,7 @@ __all__ = ["MissingPackage", "installed", "need"]
 
 #: pip's requirement for a module, where the requirement differs from the module's name.
 _REQUIREMENTS = {
+    "cv2": "opencv-python-headless",
     "gymnasium": "'gymnasium>=1'",
     "distributed": "'dask[distributed]'",
     "mujoco": "'mujoco>=3'",

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, TextIO
 
 from sigmaik._extras import installed
 
-from .report import Csv, File, Picture, Report, Series, Table
+from .report import Csv, File, Film, Picture, Report, Series, Table
 
 if TYPE_CHECKING:
     from rich.progress import Progress as Bars
@@ -52,7 +52,7 @@ def show(report: Report, args: argparse.Namespace) -> None:
     wanted = [
         file
         for file in report.files
-        if (plots or not isinstance(file, Picture)) and (form != "none" or not isinstance(file, Series))
+        if (plots or not isinstance(file, Picture | Film)) and (form != "none" or not isinstance(file, Series))
     ]
     lines: list[tuple[str, str]] = []
     for kind, files in groupby(wanted, type):
@@ -71,6 +71,8 @@ def _write(kind: type, files: Sequence[File], folder: pathlib.Path, form: str) -
             file.save(folder / f"{file.stem}.{form}", form)
         elif isinstance(file, Csv):
             file.save(folder / f"{file.stem}.csv")
+        elif isinstance(file, Film):
+            file.save(folder / f"{file.stem}.gif")
         else:
             from sigmaik._plotting import save_figure
 
@@ -79,6 +81,8 @@ def _write(kind: type, files: Sequence[File], folder: pathlib.Path, form: str) -
         return [("time series", _many(files, folder, form))]
     if kind is Csv:
         return [("table", str(folder / f"{file.stem}.csv")) for file in files]
+    if kind is Film:
+        return [("film", str(folder / f"{file.stem}.gif")) for file in files]
     *first, last = files
     if len(first) > 3:
         return [("pictures", _many(first, folder, "png")), ("picture", str(folder / f"{last.stem}.png"))]

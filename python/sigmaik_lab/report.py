@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     import rich.table
     from matplotlib.figure import Figure
 
-__all__ = ["Cell", "Csv", "File", "Picture", "Report", "Series", "Table", "bold", "compact", "red"]
+__all__ = ["Cell", "Csv", "File", "Film", "Picture", "Report", "Series", "Table", "bold", "compact", "red"]
 
 _WIDTH = 80  #: of plain tables, where a column can be wrapped
 
@@ -184,7 +184,15 @@ class Picture:
     draw: Callable[[], Figure]
 
 
-File: TypeAlias = Series | Csv | Picture
+@dataclass(frozen=True)
+class Film:
+    """A GIF file; --no-plot leaves the file out."""
+
+    stem: str
+    save: Callable[[pathlib.Path], object]
+
+
+File: TypeAlias = Series | Csv | Film | Picture
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from sigmaik import _core
 from sigmaik._types import Array
 
-__all__ = ["ArmSpec", "add_body", "arm_spec", "build", "compiled", "quaternion"]
+__all__ = ["ArmSpec", "add_body", "arm_spec", "build", "compiled", "draw_arm", "quaternion"]
 
 
 @dataclass
@@ -166,6 +166,23 @@ def add_body(parent: Any, name: str, place: Array) -> Any:
         fullinertia=[1.0, 1.1, 1.2, 0.1, 0.1, 0.1],
         explicitinertial=True,
     )
+
+
+def draw_arm(bodies: list[Any], world: Any, radius: float, colour: tuple[float, ...]) -> None:
+    """Capsules from joint to joint, for pictures: they touch nothing and have no mass."""
+    import mujoco
+
+    for parent, body in zip([world, *bodies[:-1]], bodies, strict=True):
+        if np.linalg.norm(body.pos) > 1e-3:
+            parent.add_geom(
+                type=mujoco.mjtGeom.mjGEOM_CAPSULE,
+                fromto=[0.0, 0.0, 0.0, *body.pos],
+                size=[radius, 0.0, 0.0],
+                rgba=[*colour, 1.0],
+                contype=0,
+                conaffinity=0,
+                mass=0.0,
+            )
 
 
 def quaternion(rotation: Array) -> Array:

@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sigmaik_lab.opengl import choose_opengl, open_renderer
+
 from .model import SceneModel, scene_model
-from .opengl import choose_opengl
 from .scene import GRIPPER, Task
 from .world import World
 
@@ -28,14 +29,7 @@ class Camera:
 
         self._scene: SceneModel = scene_model(task, contacts=False)
         self._data = mujoco.MjData(self._scene.model)
-        try:
-            self._renderer: Any = mujoco.Renderer(self._scene.model, size, size)
-        except Exception as error:  # each backend of MuJoCo raises an error of its own kind
-            raise OSError(
-                f"MuJoCo finds no OpenGL ({error}); set MUJOCO_GL=egl before mujoco is imported. On Debian or Ubuntu "
-                "`apt install libegl1 libgl1-mesa-dri` brings one that needs no GPU"
-            ) from error
-        self._renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = shadows
+        self._renderer: Any = open_renderer(self._scene.model, size, size, shadows)
 
     def picture(self, world: World, b: int) -> NDArray[np.uint8]:
         """(size, size, 3) RGB."""

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sigmaik._extras import need
+from sigmaik_lab.opengl import choose_opengl
 
 from .drives import make_drive
 from .episode import FPS, Action
-from .opengl import choose_opengl
 from .scene import Region, task
 from .spaces import IMAGE, action_space, information, one, state_space
 from .world import World

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from sigmaik._types import Array
-from sigmaik.sim.model import arm_spec, compiled, quaternion
+from sigmaik.sim.model import arm_spec, compiled, draw_arm, quaternion
 from sigmaik.sim.simulation import largest_inertias
 
 from .scene import CUP, GRIPPER, Task
@@ -64,7 +64,7 @@ def scene_model(task: Task, contacts: bool) -> SceneModel:
     spec.option.impratio = 10.0  # friction holds without creep
     for body in arm.bodies:
         body.gravcomp = 1.0  # drives hold their own arm
-    _draw_arm(task, arm.bodies, spec.worldbody)
+    draw_arm(arm.bodies, spec.worldbody, 0.045 * task.reach / 0.9, _GREY[:3])
     _add_gripper(spec, arm.bodies[-1], arm.tip)
     _add_table(task, spec.worldbody)
     _add_cup(spec.worldbody)
@@ -90,24 +90,6 @@ def scene_model(task: Task, contacts: bool) -> SceneModel:
         gain,
         int(model.body("goal").mocapid[0]),
     )
-
-
-def _draw_arm(task: Task, bodies: list[Any], world: Any) -> None:
-    """Capsules from joint to joint."""
-    import mujoco
-
-    radius = 0.045 * task.reach / 0.9
-    for parent, body in zip([world, *bodies[:-1]], bodies, strict=True):
-        if np.linalg.norm(body.pos) > 1e-3:
-            parent.add_geom(
-                type=mujoco.mjtGeom.mjGEOM_CAPSULE,
-                fromto=[0.0, 0.0, 0.0, *body.pos],
-                size=[radius, 0.0, 0.0],
-                rgba=_GREY,
-                contype=0,
-                conaffinity=0,
-                mass=0.0,
-            )
 
 
 def _add_gripper(spec: Any, flange: Any, tip: Array) -> None:

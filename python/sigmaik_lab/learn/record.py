@@ -80,7 +80,7 @@ def record(
     from .dataset import Writer
 
     if scenes.physics == "mujoco" or scenes.image:
-        from .opengl import choose_opengl
+        from sigmaik_lab.opengl import choose_opengl
 
         choose_opengl()
     found = task(scenes.robot, scenes.region)

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 import pathlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal, cast
 
@@ -246,8 +246,17 @@ def load_track(
     return TrackExperiment(label, target, chain, home, s, camera, poses, twists, reachable, gap, frames, pace, asked)
 
 
-def follow(e: TrackExperiment, variant: Variant, progress: Callable[[int], None] | None = None) -> Follow:
-    """Follows the target. progress: called with the number of cycles since the last call, every 1000 cycles."""
+def follow(
+    e: TrackExperiment,
+    variant: Variant,
+    progress: Callable[[int], None] | None = None,
+    look: Callable[[int, Array], Sequence[Frame]] | None = None,
+) -> Follow:
+    """Follows the target. progress: called with the number of cycles since the last call, every 1000 cycles.
+
+    look: a camera in place of the experiment's frames: called in each cycle k with the arm's configuration, it answers
+    with the samples that it has taken since the last call.
+    """
     if variant.mode not in MODES:
         raise ValueError(f"no mode '{variant.mode}'; there are {', '.join(MODES)}")
     s, camera = e.settings, e.camera
@@ -276,7 +285,7 @@ def follow(e: TrackExperiment, variant: Variant, progress: Callable[[int], None]
             noise_angular=max(1e-4, camera.rotation_noise),
         )
         stream.reset(servo.pose)
-    frames = [f for f in e.frames if variant.outliers or not f.outlier]
+    frames = [] if look is not None else [f for f in e.frames if variant.outliers or not f.outlier]
     n = len(e.poses)
     q, qdot = np.empty((n + 1, e.chain.dof)), np.empty((n, e.chain.dof))
     asked, stale = np.empty((n, 3)), np.zeros(n, dtype=np.bool_)
@@ -285,6 +294,8 @@ def follow(e: TrackExperiment, variant: Variant, progress: Callable[[int], None]
     came, newest = 0, 0.0
     for k in range(n):
         now = k * dt
+        if look is not None:
+            frames.extend(look(k, q[k]))
         while came < len(frames) and frames[came].arrival <= now + 1e-12:
             frame = frames[came]
             came, newest = came + 1, frame.arrival
