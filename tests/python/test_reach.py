@@ -482,3 +482,28 @@ def test_figure_of_a_line_shows_the_distance_from_it():
     assert "line" in figure.axes[0].get_ylabel()
     with pytest.raises(ValueError, match="no run"):
         figure_.reach_figure([])
+
+
+# --- the real arm
+
+
+def test_the_real_arms_setting_reaches_what_is_within_reach():
+    """Figures 20 and 21: rest at the poses within reach, and the singularity at the others."""
+    e = ex.load("ufactory_xarm7", "extended-line", setting="real")
+    s = e.settings
+    assert (s.gain_linear, s.gain_angular, s.max_position_error, s.rate) == (1.0, 1.0, 0.1, 50.0)
+    assert [segment.duration for segment in e.path.segments] == [40.0] * 3
+    rows = summarize(ex.run(e, methods.parse_method("jparse", s)))
+    assert rows[0].position_error > 0.3
+    assert rows[0].min_inverse_condition < 1e-4
+    assert all(row.position_error < 1e-5 and row.rest_speed < 1e-3 for row in rows[1:])
+    assert max(row.max_speed_ratio for row in rows) < 0.2
+
+
+def test_only_the_papers_real_arm_has_a_real_setting():
+    with pytest.raises(ValueError, match="there is ufactory_xarm7"):
+        ex.load("puma560", "wrist-lock", setting="real")
+    with pytest.raises(ValueError, match="moves, and waits nowhere"):
+        ex.load("ufactory_xarm7", "overhead-line", setting="real")
+    with pytest.raises(ValueError, match="no setting 'dreamt'"):
+        ex.load("ufactory_xarm7", "extended-line", setting="dreamt")

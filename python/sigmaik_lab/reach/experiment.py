@@ -28,7 +28,7 @@ from sigmaik._types import Array
 from sigmaik.methods import NamedMethod
 
 from . import paths
-from .settings import ReachSettings, published
+from .settings import ReachSettings, dwell, published
 
 __all__ = ["Experiment", "Run", "load", "run"]
 
@@ -119,6 +119,7 @@ def load(
     settings: ReachSettings | None = None,
     base: str | None = None,
     tip: str | None = None,
+    setting: str = "simulated",
     **changes: object,
 ) -> Experiment:
     """An experiment by the names of its parts.
@@ -127,6 +128,7 @@ def load(
     path: a name from `names(robot)`, a file of waypoints (CSV or JSON, see `read_waypoints`), or a Path
     settings: by default the published ones of the arm, with the path's own start and posture
     base, tip: link names; by default the URDF's root, and its only leaf
+    setting: which of the published settings, see `settings.SETTINGS`; "real" also waits longer at each waypoint
     changes: settings by name, which replace all of these where they are not None
     ValueError where a part is unknown, or of the wrong size for the arm.
     """
@@ -137,7 +139,9 @@ def load(
         else:
             path = paths.named(str(path), label, chain, home)
     if settings is None:
-        settings = published(label).with_(start=path.start, posture=path.posture)
+        settings = published(label, setting).with_(start=path.start, posture=path.posture)
+        waits = dwell(setting)
+        path = path if waits is None else path.with_dwell(waits)
     settings = settings.with_(**changes)
     for name in ("rate", "gain_linear", "gain_angular", "max_position_error", "max_orientation_error"):
         value = getattr(settings, name)

@@ -15,7 +15,7 @@ import json
 import math
 import pathlib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -72,6 +72,12 @@ class Path:
     def duration(self) -> float:
         """[s]"""
         return sum(segment.duration for segment in self.segments)
+
+    def with_dwell(self, duration: float) -> Path:
+        """The same waypoints, each held for a time [s]. ValueError where the target moves."""
+        if self.moves:
+            raise ValueError(f"the target of '{self.name}' moves, and waits nowhere")
+        return replace(self, segments=tuple(replace(segment, duration=duration) for segment in self.segments))
 
     @property
     def moves(self) -> bool:

@@ -31,6 +31,7 @@ from .files import save_run
 from .methods import parse_methods, singular_gain_sweep
 from .physics import PhysicsRun
 from .physics_table import physics_table
+from .settings import SETTINGS
 from .summary import summarize
 from .table import summary_table
 
@@ -76,6 +77,14 @@ def options(parser: argparse.ArgumentParser) -> None:
         help="a name from `sigmaik robots`, or a CSV or JSON file of waypoints: x, y, z [m], roll, pitch, "
         "yaw [rad, fixed axes], duration [s] (%(default)s)",
     )
+    arm.add_argument(
+        "--setting",
+        choices=SETTINGS,
+        default="simulated",
+        help="gains, cap, posture and time at a waypoint of the paper: "
+        + "; ".join(f"{name}: {text}" for name, text in SETTINGS.items())
+        + " (%(default)s)",
+    )
     arm.add_argument("--start", metavar="Q", help="joint positions to start from: home, zero, or a comma list")
     add_methods(arm)
     arm.add_argument(
@@ -120,7 +129,7 @@ def load(args: argparse.Namespace) -> Iterable[Comparison]:
         text = getattr(args, name)
         if text is not None:
             changes[name] = tuple(configuration(f"--{name}", text, arm.chain, arm.home))
-    loaded = experiment.load(args.robot, args.path, base=args.base, tip=args.tip, **changes)
+    loaded = experiment.load(args.robot, args.path, base=args.base, tip=args.tip, setting=args.setting, **changes)
     methods = []
     if args.gains:
         methods += singular_gain_sweep(numbers("--gains", args.gains), loaded.settings.gamma)
@@ -130,6 +139,8 @@ def load(args: argparse.Namespace) -> Iterable[Comparison]:
     if args.limits == "both" and not np.isfinite(loaded.chain.limits.velocity).any():
         held = [False]
     stem = f"{loaded.robot}-{loaded.path.name}"
+    if args.setting != "simulated":
+        stem += f"-{args.setting}"
     if args.gains and not args.method:
         stem += "-gains"
     settings = None
@@ -225,6 +236,8 @@ def _title(held: bool) -> str:
 def _headline(e: Experiment) -> str:
     s = e.settings
     posture = f"posture {s.posture_gain:g}/s" if s.posture_gain else "no posture"
+    if s.posture_gain and np.isfinite(s.posture_max_speed):
+        posture += f" up to {s.posture_max_speed:g} rad/s"
     return (
         f"{e.robot}, {e.path.name}: {e.path.description or 'no description'}\n"
         f"{e.path.duration:g} s at {s.rate:g} Hz, gains {s.gain_linear:g} and {s.gain_angular:g}/s, "
