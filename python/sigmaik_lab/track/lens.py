@@ -16,7 +16,8 @@ __all__ = ["Lens"]
 class Lens:
     """A pinhole without distortion, and a shutter that exposes all pixels at once.
 
-    The defaults are the colour pictures of the RealSense D415, which the J-PARSE paper has on the wrist: 69° × 42°.
+    The defaults have about the view of the colour pictures of the RealSense D415, which the J-PARSE paper has on the
+    wrist: 68° × 42°.
     """
 
     width: int = 424  #: [pixels]
