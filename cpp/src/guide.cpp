@@ -73,6 +73,7 @@ PositionIkOptions of_search(const Servo& servo) {
 Guide::Guide(const Servo& servo)
     : predictor_(servo.chain(), servo.method(), of_predictor(servo)), ik_(servo.chain(), of_search(servo)) {
   predictor_.elbow_ = servo.elbow_;
+  predictor_.escapes_ = servo.escapes_;
 }
 
 void Guide::set_method(const Method& method) {

@@ -297,6 +297,7 @@ struct Members<Servo> {
                                   &T::fade_,
                                   &T::rested_,
                                   &T::measured_,
+                                  &T::escapes_,
                                   &T::escape_,
                                   &T::guided_posture_,
                                   made(&T::guide_),

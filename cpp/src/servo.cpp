@@ -108,6 +108,7 @@ Servo::Servo(Chain chain, const Method& method, const ServoOptions& options)
   following_error_ = expected_error_ = JointVector::Zero(chain_.dof());
   expect_motion();
   set_collisions();
+  escapes_ = options.guided;
   if (options.guided && options.limits.position) elbow_ = detail::Owner(detail::Elbow::of(chain_));
   if (options.guided) guide_ = detail::Owner<detail::Guide>(std::make_unique<detail::Guide>(*this));
 }

@@ -13,13 +13,14 @@ namespace sigmaik {
 namespace {
 
 constexpr double kGain = 0.02;   // of σ_max, in m/rad²: up to here λ counts as none, and from twice this on in full
+constexpr double kNear = 0.1;    // of the rule's threshold: from here down to zero a direction becomes lost
 constexpr double kAsked = 1e-9;  // of the command: less along the lost directions is rounding
 constexpr double kFirst = 1e-6;  // of |c| σ_max: where the first order is less, the sign of the last cycle stays
 constexpr int kSteps = 8;        // of the power iteration in a cycle
 
 // How much the rule leaves out along each direction, and what the command asks there.
 struct Lost {
-  std::array<double, kMaxTask> part{};  // w_i, from 0 at the rule's threshold to 1 where σ_i vanishes
+  std::array<double, kMaxTask> part{};  // w_i, from 0 at a tenth of the rule's threshold to 1 where σ_i vanishes
   std::array<double, kMaxTask> asked{};
   TaskVector wanted;       // c, in the rows of the spectrum
   double threshold = 0.0;  // ε, the rule's
@@ -29,7 +30,7 @@ struct Lost {
     for (int i = 0; i < spectrum.size(); ++i) {
       const auto at = static_cast<std::size_t>(i);
       if ((resolution.singular >> i & 1u) == 0 || !(resolution.weight[at] > 0.0)) continue;
-      const double share = spectrum.sigma(i) / resolution.weight[at];
+      const double share = spectrum.sigma(i) / (kNear * resolution.weight[at]);
       part[at] = std::max(0.0, 1.0 - share * share);
       asked[at] *= part[at];
       wanted += asked[at] * spectrum.u(i);
@@ -68,10 +69,10 @@ double room(const JointLimits& limits, const JointVector& q, const JointVector& 
 
 }  // namespace
 
-// Whether the rule is one whose singular directions the second order may open.
+// Whether the second order may open the rule's singular directions.
 bool Servo::escapes() const noexcept {
   const auto* rule = std::get_if<JParse>(&solver_.method());
-  return rule != nullptr && rule->adaptive && !has_exact() && solver_.lightness().size() == 0;
+  return escapes_ && rule != nullptr && rule->adaptive && !has_exact() && solver_.lightness().size() == 0;
 }
 
 // Adds the way out to q̇. Returns whether there is one.
@@ -121,7 +122,14 @@ bool Servo::escape(const Twist& twist, JointVector& qdot) noexcept {
   }
   escape_ = turn ? JointVector(-y) : y;
   if (turn) way = -way;
-  qdot += share * (asked / lost.threshold) * way;
+  way *= share * (asked / lost.threshold);
+  // No joint's velocity limit slows down what the rule does.
+  double part = 1.0;
+  for (int i = 0; i < n; ++i) {
+    const double left = tracker_.velocity_limit(i) - (way[i] > 0.0 ? qdot[i] : -qdot[i]);
+    if (std::abs(way[i]) * part > left) part = std::max(0.0, left / std::abs(way[i]));
+  }
+  qdot += part * way;
   return true;
 }
 

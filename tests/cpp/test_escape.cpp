@@ -27,6 +27,7 @@ constexpr double kDt = 2e-3;
 ServoOptions options() {
   ServoOptions out;
   out.dt = kDt;
+  out.guided = true;
   return out;
 }
 
@@ -77,7 +78,7 @@ TEST_CASE("a twist that no motion makes to first order is followed, inside all l
         const Twist twist = unit_twist(one.axis, one.sign);
         test::LimitWatch watch(limits, kDt, servo.qdot());
         for (int k = 0; k < 1000; ++k) watch.step(servo.update_twist(twist));
-        CHECK(part_done(servo, start, twist, 2.0) > 0.6);
+        CHECK(part_done(servo, start, twist, 2.0) > 0.5);
         CHECK(watch.broken == 0);
         for (int k = 0; k < 1000; ++k) watch.step(servo.update_twist(Twist::Zero()));
         CHECK(servo.qdot().isZero(0.0));
@@ -86,7 +87,7 @@ TEST_CASE("a twist that no motion makes to first order is followed, inside all l
   }
 }
 
-TEST_CASE("an unguided servo arrives at poses in the directions that the second order opens") {
+TEST_CASE("poses in the directions that the second order opens are reached on the tool's own way") {
   for (const Case& one : kOpen) {
     CAPTURE(std::string(one.arm));
     CAPTURE(one.axis);
@@ -99,7 +100,7 @@ TEST_CASE("an unguided servo arrives at poses in the directions that the second 
     target.translation() += way.head<3>();
     target.translation().z() -= 0.02;  // sideways at the height of the stretched arm would be out of reach
     target.linear() = rotation_exp(way.tail<3>()) * target.linear();
-    for (int k = 0; k < 3000; ++k) servo.update(target);
+    for (int k = 0; k < 3000; ++k) CHECK(servo.update(target).guide != GuideState::ChangingBranch);
     CHECK(pose_error(servo.tip(), target).norm() < 1e-4);
     CHECK(servo.qdot().cwiseAbs().maxCoeff() < 1e-4);
   }
@@ -150,14 +151,17 @@ TEST_CASE("the tool never moves away from where it is asked to go, to first orde
   CHECK(singular > 1000);
 }
 
-TEST_CASE("the published rule, the other rules and `exact` answer as before") {
+TEST_CASE("the published rule, the other rules, `exact` and a servo without a guide rest there") {
   const Chain& chain = arms().at("kuka_lbr_iiwa_14_r820");
   JParse published;
   published.adaptive = false;
   ServoOptions exact = options();
   exact.exact = {true, true, true, false, false, false};
+  ServoOptions alone = options();
+  alone.guided = false;
   Servo servos[] = {Servo(chain, published, options()), Servo(chain, PseudoInverse{}, options()),
-                    Servo(chain, DampedLeastSquares{}, options()), Servo(chain, JParse{}, exact)};
+                    Servo(chain, DampedLeastSquares{}, options()), Servo(chain, JParse{}, exact),
+                    Servo(chain, JParse{}, alone)};
   for (Servo& servo : servos) {
     servo.reset(JointVector::Zero(7));
     for (int k = 0; k < 200; ++k) servo.update_twist(unit_twist(2, -1.0));

@@ -202,8 +202,8 @@ struct ServoStep {
 /// GuideState::ChangingBranch. Where no configuration is found, the state is Unreachable, and the servo goes its own
 /// way. Prediction and search are cut into slices, so that a cycle stays bounded (some 50 µs more while the guide
 /// works, for a tenth to a third of a second), and they are deterministic. Where the servo's own way arrives, the
-/// commands are those of a servo without a guide, but for the elbow's side (below). Targets that move, and twists, are
-/// never led elsewhere. The constructor takes about 2 ms.
+/// commands are those of a servo without a guide, but for the elbow's side and singularities (below). Targets that
+/// move, and twists, are never led elsewhere. The constructor takes about 2 ms.
 ///
 /// *The elbow's side.* The straight elbow is a singularity with the same reaches on either side. An arm that folds to
 /// the other side, on its way back from the edge of its reach, may end at a position limit, and another time has other
@@ -216,20 +216,22 @@ struct ServoStep {
 /// leads the joints, it may change the side.
 ///
 /// *Out of a singularity.* To first order no motion of the joints moves the tool along a direction u that is lost, with
-/// uᵀJ = 0. To second order a motion δ in the null space does, by ½ δᵀH δ with H_kj = uᵀ∂J_j/∂q_k, symmetrised. So the
-/// adaptive JParse of a servo leaves an exactly singular configuration where the second order leads the right way: a
-/// straight-up iiwa or Gen3 follows a twist sideways, down, and about the axis in which it is straight. With the part
-/// w_i = 1 − (σ_i/ε)² that the rule leaves out along a direction below its threshold ε, c = Σ w_i u_i u_iᵀẋ, u = c/|c|
-/// and the projector P = 1 − Σ (1 − √w_i) v_i v_iᵀ (w_i = 0 for regular directions), the servo adds
+/// uᵀJ = 0. To second order a motion δ in the null space does, by ½ δᵀH δ with H_kj = uᵀ∂J_j/∂q_k, symmetrised. So a
+/// guided servo with the adaptive JParse leaves an exactly singular configuration where the second order leads the
+/// right way: a straight-up iiwa or Gen3 follows a twist along y, down, and about x. With the part
+/// w_i = max(0, 1 − (σ_i/0.1ε)²) of a direction that is lost below a tenth of the rule's threshold ε, c = Σ w_i u_i
+/// u_iᵀẋ, u = c/|c| and the projector P = 1 − Σ (1 − √w_i) v_i v_iᵀ (w_i = 0 for regular directions), the servo adds
 ///
 ///     q̇ = s (|c|/ε) P y,     P H P y = λ y,   λ the largest eigenvalue,
 ///
-/// where s goes from 0 at λ = 0.02 σ_max/rad to 1 at twice this. At σ_i = ε this is zero, and from there on the rule
-/// alone moves on along the direction that has opened; at σ_i = 0 its speed is the one that the threshold allows the
-/// direction. The sign of y is the one for which cᵀJ P y ≥ 0, so what is added never lets the error grow (with equal
-/// gains V̇ ≤ 0 stays); where the first order does not decide, y follows that of the last cycle, and in the first cycle
-/// the side with more room to the position limits. Nothing is added where λ ≤ 0: beyond the reach no motion gains. Not
-/// with other rules, `exact`, or joint_weights. A singularity that opens only by a detour (a wrist) is the guide's.
+/// where s goes from 0 at λ = 0.02 σ_max/rad to 1 at twice this. At σ_i = 0 the speed is the one that the threshold
+/// allows the direction. At 0.1 ε it is zero, and the rule alone, whose q̇ = (σ_i/ε)(|c|/ε) grows with σ_i, moves on
+/// along the direction that has opened. The sign of y is the one for which cᵀJ P y ≥ 0, so what is added never lets the
+/// error grow (with equal gains V̇ ≤ 0 stays); where the first order does not decide, y follows that of the last cycle,
+/// and in the first cycle the side with more room to the position limits. Nothing is added where λ ≤ 0, because beyond
+/// the reach no motion gains, nor as far as a joint's velocity limit would slow down what the rule does. Other rules,
+/// `exact` and joint_weights have no such way. Where a singularity opens only by a detour (a wrist), the guide leads to
+/// a pose.
 ///
 /// *Time of a cycle.* update(), update_twist() and hold() take the time since the last call on the robot's clock, in
 /// [kShortestCycle, kLongestCycle] times options().dt; options().dt where no time is given. A program that loses a
@@ -450,6 +452,7 @@ class Servo {
   double max_linear_error_;
   double fade_ = 1.0, rested_ = 0.0;
   bool measured_ = false;
+  bool escapes_ = false;                         // out of singularities by second order
   JointVector escape_;                           // y of the way out of a singularity, in the last cycle; empty: none
   JointVector guided_posture_;                   // the posture that the guide has given; empty: none
   detail::Owner<detail::Guide> guide_;           // null: not guided
