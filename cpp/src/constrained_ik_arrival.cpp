@@ -125,8 +125,8 @@ ConstrainedIk::Closing ConstrainedIk::close(bool still) noexcept {
 // At the edge of the reach, and where the approximate rows cannot be met together with the exact ones, the way that a
 // linearisation shows is too long, and the arm would swing about a resting target. So each time that the closing motion
 // turns against the arm, more than twice, a part of its speed stays; all of it comes back when the target moves. Each
-// time that the error has become less by a fiftieth, one turn is forgiven: an arm that swings about a singularity on its
-// way goes on, and at the edge of the reach the error falls no further.
+// time that the error has become less by a fiftieth, one turn is forgiven: an arm that swings about a singularity on
+// its way goes on, and at the edge of the reach the error falls no further.
 void ConstrainedIk::calm(const JointVector& wanted, double error, bool still) noexcept {
   const bool against = tracker_.qdot().dot(wanted) < 0.0;
   if (!still) {

@@ -33,8 +33,9 @@ struct Elbow {
     return open >= 0.5 * kMargin ? 1 : open <= -0.5 * kMargin ? -1 : 0;
   }
 
-  // None where the arm has no such joint, where its elbow can turn round, and where the sides are alike and a self-motion
-  // leads from one to the other: to keep a side, such an arm would turn its upper arm fast near the straight elbow.
+  // None where the arm has no such joint, where its elbow can turn round, and where the sides are alike and a
+  // self-motion leads from one to the other: to keep a side, such an arm would turn its upper arm fast near the
+  // straight elbow.
   static std::unique_ptr<Elbow> of(const Chain& chain);
 };
 

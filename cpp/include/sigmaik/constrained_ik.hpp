@@ -30,10 +30,10 @@
 ///
 /// where κ is the part of an error that a cycle closes without limits: dt/25 ms for the exact rows, and α²/(α²+β²) for
 /// the others, whichever is more. Δq₀/κ is the way that is left. The way ends inside the position limits; otherwise a
-/// joint would stand at its limit while the others take the tip away from the target. The joints never close faster than
-/// they can still brake on this way, with half of their acceleration. The optimisation then asks its rows to change by J c dt
-/// instead of −e₀. As the way goes to zero, c does: a resting target is a fixed point. An exact error that one cycle
-/// can make up, with a twentieth of the acceleration, is made up in one cycle.
+/// joint would stand at its limit while the others take the tip away from the target. The joints never close faster
+/// than they can still brake on this way, with half of their acceleration. The optimisation then asks its rows to
+/// change by J c dt instead of −e₀. As the way goes to zero, c does: a resting target is a fixed point. An exact error
+/// that one cycle can make up, with a twentieth of the acceleration, is made up in one cycle.
 ///
 /// Where the limits of a cycle leave the exact part undone, the direction of what can be done is not that of the way,
 /// and joints that move nothing but the exact part would tilt the tool. There, and for every closing motion under a
@@ -43,8 +43,8 @@
 ///
 /// At the edge of the reach the way Δq₀/κ is longer than what a straight line finds, and c turns against the arm again
 /// and again. From the second such turn at a resting target on, each turn leaves 0.7 of c. Each time that the error has
-/// fallen by a fiftieth, one turn is forgiven: an arm that swings about a singularity on its way arrives. At the edge of
-/// the reach the error falls no further, so c goes to zero there. A target that moves gets all of c back.
+/// fallen by a fiftieth, one turn is forgiven: an arm that swings about a singularity on its way arrives. At the edge
+/// of the reach the error falls no further, so c goes to zero there. A target that moves gets all of c back.
 ///
 /// Along a valley of the error the arm may creep for as long as it likes. After settling_time() at a resting target q̇
 /// is faded out with a time constant of 1 s, and not_settling says so: a target that rests always brings the arm to
