@@ -169,21 +169,31 @@ TEST_CASE("the published rule, the other rules, `exact` and a servo without a gu
   }
 }
 
-TEST_CASE("the same start gives the same way, and a cycle calls no heap") {
+TEST_CASE("the same start gives the same way") {
   for (const Case& one : kOpen) {
     const Chain& chain = arms().at(one.arm);
     Servo first(chain, JParse{}, options()), second(chain, JParse{}, options());
     first.reset(JointVector::Zero(chain.dof()));
     second.reset(JointVector::Zero(chain.dof()));
     const Twist twist = unit_twist(one.axis, one.sign);
-    const test::HeapWatch watch;
-    bool same = true;
     for (int k = 0; k < 300; ++k) {
-      const ServoStep a = first.update_twist(twist), b = second.update_twist(twist);
-      same = same && (a.qdot.array() == b.qdot.array()).all();
+      REQUIRE((first.update_twist(twist).qdot.array() == second.update_twist(twist).qdot.array()).all());
     }
-    CHECK(watch.calls() == 0);
-    CHECK(same);
     CHECK(!first.q().isZero(1e-3));
   }
 }
+
+#ifdef SIGMAIK_TEST_HEAP
+TEST_CASE("a cycle out of a singularity calls no heap") {
+  for (const Case& one : kOpen) {
+    const Chain& chain = arms().at(one.arm);
+    Servo servo(chain, JParse{}, options());
+    servo.reset(JointVector::Zero(chain.dof()));
+    const Twist twist = unit_twist(one.axis, one.sign);
+    const test::HeapWatch watch;
+    for (int k = 0; k < 300; ++k) servo.update_twist(twist);
+    CHECK(watch.calls() == 0);
+    CHECK(!servo.q().isZero(1e-3));
+  }
+}
+#endif
