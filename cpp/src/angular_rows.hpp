@@ -1,5 +1,5 @@
 #pragma once
-// Which rows of a task are angular.
+// Which rows of a task are angular, and their weight.
 
 #include <cstdint>
 
@@ -18,6 +18,15 @@ inline std::uint8_t angular_rows(const Task& task) noexcept {
     ++row;
   }
   return angular;
+}
+
+// Multiplies the angular rows by the length scale.
+template <typename Rows>
+void weigh(const Task& task, double length_scale, Rows& rows) noexcept {
+  const std::uint8_t angular = angular_rows(task);
+  for (int row = 0; row < rows.rows(); ++row) {
+    if ((angular >> row & 1u) != 0) rows.row(row) *= length_scale;
+  }
 }
 
 }  // namespace sigmaik::detail

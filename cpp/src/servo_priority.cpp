@@ -16,15 +16,7 @@ namespace sigmaik {
 namespace {
 
 using detail::angular_rows;
-
-// Multiplies the angular rows by the length scale.
-template <typename Rows>
-void weigh(const Task& task, double length_scale, Rows& rows) noexcept {
-  const std::uint8_t angular = angular_rows(task);
-  for (int row = 0; row < rows.rows(); ++row) {
-    if ((angular >> row & 1u) != 0) rows.row(row) *= length_scale;
-  }
-}
+using detail::weigh;
 
 // How far a command is lost, in [0, 1]: 0 where a fifth of the command is left undone or less, 1 where four fifths or
 // more.
