@@ -354,7 +354,7 @@ ServoStep Servo::resolve(const Twist& twist, const Twist* feedforward, bool fade
   step.qdot = solution.qdot;
   step.achieved_twist = solution.achieved_twist;
 
-  const bool leaves = solution.singular != 0 && escapes() && escape(twist, step.qdot);
+  const bool leaves = escape(twist, step.qdot);
   bool rule = feedforward == nullptr || !arrive(*feedforward, step.qdot);  // the rule's answer stands
   if (leaves) rule = false;
   if (fade_in(step.qdot, fade)) rule = false;

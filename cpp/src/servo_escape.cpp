@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <utility>
 #include <variant>
 
 #include <sigmaik/servo.hpp>
@@ -75,19 +77,15 @@ bool Servo::escapes() const noexcept {
   return escapes_ && rule != nullptr && rule->adaptive && !has_exact() && solver_.lightness().size() == 0;
 }
 
-// Adds the way out to q̇. Returns whether there is one.
+// Adds the way out to q̇. Returns whether there is one. In a cycle without one, the way of the last cycle is forgotten.
 bool Servo::escape(const Twist& twist, JointVector& qdot) noexcept {
-  const bool goes_on = escape_.size() != 0;
-  const JointVector before = escape_;
-  escape_.resize(0);
+  const JointVector before = std::exchange(escape_, JointVector());
+  if (solver_.resolution().singular == 0 || !escapes()) return false;
 
   const Spectrum& spectrum = solver_.spectrum();
   const Eigen::Matrix3d& rotation = state_.tip.linear();
   TaskVector command = select_rows(options_.task, rotation, twist);
-  const unsigned angular = detail::angular_rows(options_.task);
-  for (Eigen::Index row = 0; row < command.size(); ++row) {
-    if ((angular >> row & 1u) != 0) command[row] *= solver_.length_scale();
-  }
+  detail::weigh(options_.task, solver_.length_scale(), command);
   const Lost lost(spectrum, solver_.resolution(), command);
   const double asked = lost.wanted.norm();
   if (!(asked > kAsked * command.norm())) return false;
@@ -100,6 +98,7 @@ bool Servo::escape(const Twist& twist, JointVector& qdot) noexcept {
   };
 
   const int n = chain_.dof();
+  const bool goes_on = before.size() != 0;
   JointVector y = before;
   if (!goes_on) {
     JointMatrix projected(n, n);
