@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from .experiment import START, Follow
 from .stage import Look
-from .summary import TrackSummary, summarize_track
+from .summary import TrackSummary, largest, mean, quantile, summarize_track
 
 __all__ = ["NEAR", "Lost", "SeenSummary", "in_view", "losses", "summarize_seen"]
 
@@ -113,28 +113,20 @@ def summarize_seen(camera: str, run: Follow, looks: Sequence[Look]) -> SeenSumma
         found=len(found),
         lost=len(lost),
         longest=max((x.end - x.begin for x in lost), default=0.0),
-        tag_position_mean=_of(np.mean, linear),
-        tag_position_95=_of(_quantile, linear),
-        tag_rotation_mean=_of(np.mean, angular),
-        tag_rotation_95=_of(_quantile, angular),
+        tag_position_mean=mean(linear),
+        tag_position_95=quantile(linear),
+        tag_rotation_mean=mean(angular),
+        tag_rotation_95=quantile(angular),
         tag_wrong=sum(frame.outlier for frame in e.frames),
         refused=common.refused,
-        seen_mean=_of(np.mean, error[seen]),
-        seen_95=_of(_quantile, error[seen]),
-        seen_max=_of(np.max, error[seen]),
-        seen_rotation=_of(np.mean, run.orientation_error[seen]),
+        seen_mean=mean(error[seen]),
+        seen_95=quantile(error[seen]),
+        seen_max=largest(error[seen]),
+        seen_rotation=mean(run.orientation_error[seen]),
         outside_mean=common.outside_mean,
-        unseen_mean=_of(np.mean, error[unseen]),
-        unseen_max=_of(np.max, error[unseen]),
+        unseen_mean=mean(error[unseen]),
+        unseen_max=largest(error[unseen]),
         delay=common.delay,
         joint_jerk_rms=common.joint_jerk_rms,
         broken=common.broken,
     )
-
-
-def _quantile(values: NDArray[np.float64]) -> float:
-    return float(np.quantile(values, 0.95))
-
-
-def _of(what: object, values: NDArray[np.float64]) -> float:
-    return float(what(values)) if len(values) else math.nan  # type: ignore[operator]

@@ -11,7 +11,7 @@ from sigmaik._types import Array
 
 from .experiment import Follow
 
-__all__ = ["TrackSummary", "summarize_track"]
+__all__ = ["TrackSummary", "largest", "mean", "quantile", "summarize_track"]
 
 BACK = 0.1  #: [m] from the target: a tip this near is back, whatever its lag is
 #: An excess below this part of the limit is the rounding of finite differences.
@@ -67,14 +67,14 @@ def summarize_track(run: Follow, without: Follow | None = None) -> TrackSummary:
         method=run.variant.method.label,
         mode=run.variant.mode,
         feedforward=run.variant.feedforward,
-        position_mean=_mean(position[inside]),
-        position_95=_quantile(position[inside]),
-        position_max=_largest(position[inside]),
-        orientation_mean=_mean(orientation[inside]),
-        orientation_95=_quantile(orientation[inside]),
-        orientation_max=_largest(orientation[inside]),
-        outside_mean=_mean(position[outside]),
-        outside_max=_largest(position[outside]),
+        position_mean=mean(position[inside]),
+        position_95=quantile(position[inside]),
+        position_max=largest(position[inside]),
+        orientation_mean=mean(orientation[inside]),
+        orientation_95=quantile(orientation[inside]),
+        orientation_max=largest(orientation[inside]),
+        outside_mean=mean(position[outside]),
+        outside_max=largest(position[outside]),
         return_time=_return_time(run),
         delay=_delay(run),
         tip_jerk_rms=float(np.sqrt(np.mean(run.tip_jerk**2))),
@@ -157,13 +157,16 @@ def _drift(run: Follow) -> float:
     return float(np.linalg.norm(run.tips[at, :3, 3] - run.tips[at[0], :3, 3], axis=1).max())
 
 
-def _mean(values: Array) -> float:
+def mean(values: Array) -> float:
+    """NaN where there are no values, as for the two below."""
     return float(values.mean()) if len(values) else math.nan
 
 
-def _quantile(values: Array) -> float:
+def quantile(values: Array) -> float:
+    """Below which 95 % of the values are."""
     return float(np.quantile(values, 0.95)) if len(values) else math.nan
 
 
-def _largest(values: Array) -> float:
+def largest(values: Array) -> float:
+    """The largest value."""
     return float(values.max()) if len(values) else math.nan
