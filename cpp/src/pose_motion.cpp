@@ -14,8 +14,8 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr double kLongestTime =
-    1e6;  // [s]: up to here squares and quotients of rates and accelerations keep their digits
+// [s] up to here squares and quotients of rates and accelerations keep their digits
+constexpr double kLongestTime = 1e6;
 
 // A vector that changes with time, and its first two derivatives.
 struct Curve {
